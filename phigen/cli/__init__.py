@@ -79,8 +79,8 @@ class Commands(click.Group):
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         if isinstance(sys.stdout, TextIOWrapper):
-            # A character that the terminal cannot show is written as an escape, as on stderr, and does not end the
-            # command.
+            # Characters that the terminal cannot show are written as escapes, as Python does on stderr; by default,
+            # printing them would raise an exception.
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
             interrupts.working = True
@@ -101,8 +101,9 @@ class Commands(click.Group):
             with console.heeding(), console.watching():
                 return super().invoke(ctx)
         except (BrokenPipeError, EOFError) as error:
-            # Reported here, since click would exit with 1, the code of a wrong spec, or treat an EOFError as ^D at a
-            # prompt. A real ^D needs no care: prompts of click turn it into Abort.
+            # These exceptions are reported here. click would exit with code 1 for a broken pipe, but 1 means a wrong
+            # spec; and it would take an EOFError for ^D at a prompt. A real ^D does not arrive here, since the prompts
+            # of click raise Abort.
             return failures.report(error, console)
 
 

@@ -20,10 +20,7 @@ LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return the planned changes of each system, with its bindings and with the C files that the bindings call.
-
-    Raises `SpecError` that lists all systems for which bindings cannot be generated.
-    """
+    """Return the planned changes of each system, extended by its bindings and by the C files that the bindings call."""
     from phigen.bindings.emitter import binding
     from phigen.cli.outputs import Change, read
 

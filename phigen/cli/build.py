@@ -188,7 +188,8 @@ def _plan(
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
     """Yield changes that remove generated files whose spec no longer exists.
 
-    Nothing is removed unless a whole folder is built: a build of single specs does not know which others exist.
+    Nothing is removed unless a whole folder is built, since a build of single specs does not know which other specs
+    exist.
     """
     from phigen.cli.outputs import orphans
 
@@ -198,9 +199,9 @@ def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], opt
 
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
-    """Raise CheckError that lists the files which differ from what ``command`` would write; do nothing if none do.
+    """Raise CheckError with a list of the files that differ from those that ``command`` would write.
 
-    With ``diff``, the differences are printed first.
+    Does nothing if no file differs. With ``diff``, the differences are printed first.
     """
     outdated = [change for change in planned if change.state != "unchanged"]
     if diff:
@@ -256,8 +257,8 @@ def _write(
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify the written solvers, and write a certificate for each system that meets all bounds.
 
-    A certificate of an earlier build is removed first. Systems that miss a bound get none; their errors are raised
-    together at the end.
+    The certificate of an earlier build is removed first. A system that misses a bound gets no certificate. The errors
+    of all these systems are raised together at the end.
     """
     from phigen.cli import certificate
     from phigen.cli.verify import missed_bounds, verified, verified_lattice

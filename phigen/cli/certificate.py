@@ -1,6 +1,6 @@
-"""Certificates of `phigen build --certify`: results of `phigen verify` for the files of one build.
+"""Certificates of `phigen build --certify`: the results of `phigen verify` for the files of one build.
 
-Hashes tie a certificate to the spec and to these files.
+A certificate contains hashes of the spec and of the files for which it is valid.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """Return the part of a certificate that ties it to a build.
+    """Return the part of a certificate that identifies the build for which it is valid.
 
     It has the version of phigen, the name of the system, the hash of the spec, and for each file the checksum of the
     text below its header.
@@ -38,7 +38,10 @@ def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, An
 
 
 def text_of(compilation: Compilation, files: Mapping[str, str], verification: Verification) -> str:
-    """Return the text of a certificate. It depends only on spec, files and version, apart from measured numbers."""
+    """Return the text of a certificate.
+
+    Apart from measured numbers, the text depends only on the spec, the files and the version of phigen.
+    """
     from phigen.cli.verify import described
 
     data = {**identity(compilation, files), "verification": described(verification)}

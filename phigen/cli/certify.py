@@ -21,8 +21,8 @@ from phigen.errors import CheckError
 if TYPE_CHECKING:
     from phigen.spec.model import Spec
 
-#: Half-width of the default interval of a coordinate: relative to its value at the start, or absolute if that value is
-#: below 1.
+#: Half-width of the default interval of a coordinate, as a fraction of its initial value. If the initial value is
+#: smaller than 1 in magnitude, the half-width is this number itself.
 WIDTH = 0.01
 
 
@@ -146,7 +146,10 @@ def command(
 
 
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
-    """Return the interval of each coordinate: from ``--box``, else from ``box:`` of the run, else around its start."""
+    """Return the interval of each coordinate.
+
+    The interval comes from ``--box``, else from ``box:`` of the run; else it is centred at the initial value.
+    """
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
         for name, value in zip(spec.coordinates, experiment.initial, strict=True)
@@ -164,7 +167,7 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
     """Return the interval of times for which the bound holds: from ``--time``, else the times of the run.
 
-    If H does not depend on the time, both ends are the start of the run.
+    If H does not depend on the time, the interval consists of the start of the run alone.
     """
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from phigen.spec.model import Spec
     from phigen.symbolic.verdict import Statement
 
-#: Initial values of lattices with more sites are not computed, so that a check needs little time and memory.
+#: For lattices with more sites than this, initial values are not computed, so that a check needs little time and
+#: memory.
 MOST_SITES = 1_000_000
 
 _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow", "undecided": "yellow"}
@@ -158,7 +159,7 @@ def _say_unexamined(collector: Collector, console: Console) -> None:
 
 
 def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
-    """Collect the errors of the starts of a lattice's runs, such as a list of initial values of the wrong length."""
+    """Collect errors in the initial states of the runs of a lattice, such as a list of wrong length."""
     from phigen.lattice.states import start_of
 
     refused: dict[str, Diagnostic] = {}
@@ -175,7 +176,7 @@ def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
 
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
-    """Collect the errors of those targets of the spec that cannot generate code for the system."""
+    """Collect an error for each target of the spec that cannot generate code for the system."""
     from phigen import registry
 
     for name in spec.targets:

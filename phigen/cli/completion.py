@@ -34,7 +34,7 @@ def bundled_names(ctx: click.Context, parameter: click.Parameter, prefix: str) -
 def runs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
     """Return the names of runs of the specs on the command line; specs with errors are ignored."""
     run_names: list[str] = []
-    # When click completes an option, it has not yet assigned the other words to parameters.
+    # When click completes an option, it has not yet assigned the other words of the command line to parameters.
     for source in ctx.args:
         try:
             run_names += load_one(source).runs

@@ -73,14 +73,19 @@ class Console:
             yield
 
     def watching(self) -> AbstractContextManager[None]:
-        """Context in which stages of the compiler are shown: on a terminal without -q as a status line, with -v as
-        messages."""
+        """Context in which the stages of the compiler are shown.
+
+        On a terminal they appear as a status line, unless -q is given; with -v they are printed as messages.
+        """
         return self._display.watching()
 
     @contextmanager
     def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
-        """Context with a progress bar on stderr; its value is a function of the number of steps done, or None without a
-        terminal."""
+        """Context with a progress bar on stderr.
+
+        The value of the context is a function, to be called with the number of steps done so far. It is None if stderr
+        is no terminal, or with -q.
+        """
         if self.quiet or not sys.stderr.isatty():
             yield None
             return

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from phigen import progress
 from phigen.progress import Stage
 
-#: Seconds before the line appears, and seconds between two updates.
+#: Seconds until the status line appears, and seconds between two of its updates.
 DELAY, PERIOD = 1.0, 0.2
 
 
 class Display:
-    """Status line of the active stages.
+    """Status line of the active stages of the compiler.
 
     ``shows`` returns whether the line is drawn; ``began`` is called with the name of each stage that starts.
     """
@@ -31,7 +31,7 @@ class Display:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Context in which the stages of this thread are shown."""
+        """Context in which the stages of the compiler that run in this thread are shown."""
         try:
             with progress.watched(self._receive_stages):
                 yield

@@ -26,10 +26,10 @@ AnySolver = Solver | LatticeSolver
 
 
 def ended(experiment: E, solver: AnySolver, console: Console) -> E:
-    """Return the experiment with its field ``end`` and its number of steps set by the keys ``until`` and ``stop``.
+    """Return the experiment with its end, as the keys ``until`` and ``stop`` of the run define it.
 
-    ``until`` is a time; ``stop`` is an expression, at whose first zero the run ends. Runs without these keys are
-    returned unchanged.
+    ``until`` is a time; ``stop`` is an expression, at whose first zero the run ends. The field ``end`` and the number
+    of steps are set. Runs without these keys are returned unchanged.
     """
     run, h = experiment.run, experiment.h
     end: End | None = None
@@ -61,7 +61,7 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
         return zero
     try:
         last = _count(experiment, solver, end)
-    except BackendError:  # The partial step up to ``until`` fails, but the run stops before it reaches ``until``.
+    except BackendError:  # the partial step up to ``until`` fails, but ``stop`` ends the run before this step
         return zero
     return zero if _count(experiment, solver, zero) < last else None
 
@@ -76,9 +76,9 @@ def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
 
 
 def length(experiment: Experiment, solver: AnySolver) -> float:
-    """Return the length of a run up to its end: in the time t, or with a monitor in the new time τ.
+    """Return the length of a run up to its end, in the time t.
 
-    Raises `StepError`.
+    With a monitor g, the length is that in the new time τ, for which dt = g dτ. Raises `StepError`.
     """
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
@@ -89,16 +89,17 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
 
 
 def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequence[str] = ()) -> E:
-    """Return the experiment with times at which states are stored: at equal distances ``every``, or listed in ``at``.
+    """Return the experiment with the times at which states are stored.
 
-    Each text of ``at`` has times, or is the path of a file of times. Without these options, the keys of the run apply.
+    The times have the equal distances ``every``, or are listed in ``at``. Each text in ``at`` contains times, or is the
+    path of a file that contains times. Without these options, the keys of the run apply.
     """
     if every is None and not at and experiment.run.every is not None:
         every = float(experiment.run.every)
     time_list = _parse_times(at) if at else [float(t) for t in experiment.run.at] if every is None else []
     if every is None and not time_list:
         return experiment
-    # with a monitor, only a session of the solver knows the time after the last step
+    # with a monitor, the steps are not equal in t, so the time of the end is known only after the steps were made
     if experiment.end is None and solver.interface.monitored:
         end_time = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=end_time)
@@ -111,10 +112,10 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequ
 
 
 def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
-    """Return the listed times in order, without the start and without times after the end.
+    """Return the listed times in order, without the start and without times outside the run.
 
-    Raises `click.BadParameter` if times on the command line (``asked``) are outside the run. Times in the spec are
-    dropped if the run ends earlier.
+    Raises `click.BadParameter` for times outside the run if they come from the command line (``asked``). The option may
+    list times after a zero of ``stop``, which ended the run early; they are left out as well.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     too_late = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
@@ -129,7 +130,10 @@ def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float],
 
 
 def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[float]:
-    """Return times at equal distances from the start of the run, without those before the steps begin."""
+    """Return times at equal distances, counted from the start of the run.
+
+    If the run continues a finished one, the times of the finished run are left out.
+    """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     if not every > 0 or not math.isfinite(every):
         raise click.BadParameter("the time between states must be positive", param_hint="--every")
@@ -142,8 +146,10 @@ def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[fl
 
 
 def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[float], option: str) -> None:
-    """Raise `click.BadParameter` for times within a step of a system with noise, whose path is known only after whole
-    steps."""
+    """Raise `click.BadParameter` if the system has noise and a time lies inside a step.
+
+    The path of a system with noise is known only after whole steps.
+    """
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h
         if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):

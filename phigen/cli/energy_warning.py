@@ -14,22 +14,23 @@ from phigen.tuning.equal_work import rk4_energy_error
 from phigen.tuning.problem import Problem
 from phigen.tuning.search import rounded_down
 
-#: Energy error for which a step is proposed; at this error, orbits keep their shape.
+#: Energy error that the proposed step should have. With this error, orbits keep their shape.
 TARGET_ENERGY_ERROR = 1e-3
 
-#: Least energy error of a run that is compared with RK4; at smaller errors, orbits keep their shape.
+#: Runs with smaller energy errors than this are not compared with RK4, since their orbits keep their shape.
 LEAST_COMPARED_ERROR = 1e-3
-#: Most steps of a run that is compared with RK4. Longer runs are not compared: the comparison would take long, and the
-#: energy error of RK4 grows with time, so RK4 is seldom better there.
+#: Runs with more steps than this are not compared with RK4: the comparison would take long. Besides, the energy error
+#: of RK4 grows with time, so RK4 is seldom better in long runs.
 MOST_STEPS = 1_000_000
-#: Factor by which RK4 must be more accurate before the warning appears, since the measured times are noisy.
+#: The warning appears if the error of RK4 is smaller by more than this factor. A smaller advantage may be an accident,
+#: since measured times vary.
 LEAST_RK4_ADVANTAGE = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
 
 
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
-    """Return the warning about the energy error of a run of an ordinary system; "" if there is none.
+    """Return the warning about the energy error of a run of an ordinary system; "" if no warning is necessary.
 
     If forces act or H depends on the time, the error is that of the energy balance, H minus the work done. There is no
     warning if the integral for the work is too inaccurate: if its estimated error is not small compared with the energy
@@ -60,8 +61,8 @@ def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -
 def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, steps: int) -> bool:
     """Return whether the energy error of a run is to be compared with that of RK4.
 
-    This holds for runs in C, with equal steps in t, of systems that conserve energy, if `rk4_warning` can apply to an
-    error of this size.
+    The system must conserve energy, the steps must be equal in t, and the target must be C. The energy error and the
+    number of steps must be within the limits of this module.
     """
     conserved = not compilation.system.driven and energy.unit.kind in _SCALES and not energy.unit.moves
     warnable = LEAST_COMPARED_ERROR < energy.error <= LARGE_ENERGY_ERROR and steps <= MOST_STEPS
@@ -69,10 +70,10 @@ def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, step
 
 
 def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, energy: Drift) -> str:
-    """Return the warning that RK4 with the same processor time has less than half of the energy error; "" if it has
-    more.
+    """Return the warning that RK4 is more accurate with the same processor time; "" if it is not.
 
-    The caller checks `compares_with_rk4` first.
+    The energy error of RK4 must be smaller by the factor `LEAST_RK4_ADVANTAGE`. The caller checks `compares_with_rk4`
+    first.
     """
     spec = compilation.spec
     theirs = rk4_energy_error(compilation, solver.backend, problem)
@@ -99,9 +100,10 @@ def _multiple(error: float) -> str:
 
 
 def advised_step(error: float, h: float, order: int) -> float:
-    """Return an estimate of the step with energy error `TARGET_ENERGY_ERROR`; errors are proportional to h^order.
+    """Return an estimate of the step whose energy error is `TARGET_ENERGY_ERROR`.
 
-    Errors above 1 count as 1, since they only show that the step is too large.
+    The estimate assumes that errors are proportional to h^order. Errors above 1 count as 1, since they only show that
+    the step is too large.
     """
     step = abs(h) * (TARGET_ENERGY_ERROR / min(error, 1.0)) ** (1 / order)
     return rounded_down(step, 1) * (1 if h > 0 else -1)

@@ -1,4 +1,4 @@
-"""Existing files in places where a command writes: files of phigen are replaced, other files only with ``--force``."""
+"""Existing files that a command would replace: files of phigen are replaced, other files only with ``--force``."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
 def wrote(path: Path) -> str:
     """Return the message that a file was written, or that it replaced an existing file.
 
-    A run that continues its file, by --resume or --extend, has "wrote" it.
+    If a run continues its own file, by --resume or --extend, the message says "wrote".
     """
     ctx: Any = click.get_current_context()
     continued = ctx.params.get("resume") or ctx.params.get("extend")
@@ -88,7 +88,10 @@ def wrote(path: Path) -> str:
 
 
 def _is_of_phigen(path: Path) -> bool:
-    """Whether phigen seems to have written a file: a table has the column t, other files contain the word phigen."""
+    """Whether phigen seems to have written a file.
+
+    This is so if a table has the column t, and if any other file contains the word phigen.
+    """
     match path.suffix.lower():
         case ".csv":
             with path.open("rb") as file:

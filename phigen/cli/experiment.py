@@ -1,4 +1,4 @@
-"""A run of a spec with the changes that the command line makes, and its solver."""
+"""A run of a spec, changed by options of the command line, and the solver for it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Run with the changes of the command line.
+    """Run of a spec, changed by options of the command line.
 
     ``end`` is set if the run ends at a time or at a zero of an expression, possibly by a partial last step. ``times``
-    are the times of stored states, which replace the stride; the first and the last state are stored too. ``past``
-    consists of the rows of a finished run (`phigen.cli.past.StoredRows`) that this run continues. ``first`` is the
-    attitude at the start, if it is not the identity.
+    are the times of stored states, which replace the stride; the first and the last state are stored too. ``past`` has
+    the rows of a finished run that this run continues (`phigen.cli.past.StoredRows`). ``first`` is the attitude at the
+    start, if it is not the identity.
     """
 
     run: Run
@@ -60,15 +60,15 @@ class Experiment:
 
     @property
     def made(self) -> int:
-        """Number of steps of the finished run ``past``, each of which has used the random numbers of one step.
+        """Number of steps of the finished run ``past``; a partial last step counts as a whole one.
 
-        A partial step counts as a whole one.
+        Each step has used up the random numbers of one step, also a partial one.
         """
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
     def begun(self, solver: Any) -> Any:
-        """Return a session of the solver at the point where the steps start. Raises `StepError`."""
+        """Return a session of the solver, at the state from which its steps start. Raises `StepError`."""
         from phigen.cli.past import begun
 
         return begun(solver, self)
@@ -225,7 +225,10 @@ def with_stop(spec: Spec, run: Run, text: str | None) -> Run:
 
 
 def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
-    """Raise `click.BadParameter` for numbers outside the bounds of their parameters; arrays are checked elsewhere."""
+    """Raise `click.BadParameter` for numbers outside the bounds of their parameters.
+
+    Parameters that are arrays are checked elsewhere.
+    """
     for p in spec.parameters:
         value = parameters.get(p.name)
         if isinstance(value, float | Fraction) and p.refuses(value):

@@ -1,4 +1,4 @@
-"""Messages on stderr and exit codes of exceptions."""
+"""Exceptions of commands: the message that is printed on stderr, and the exit code."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SeveralError(PhigenError):
 
 
 class Collector:
-    """Collector of errors, so that a command reports the errors of all its specs; `finish` raises them."""
+    """Collector of the errors of several specs, so that a command reports all of them; `finish` raises them."""
 
     def __init__(self) -> None:
         self.errors: list[PhigenError] = []

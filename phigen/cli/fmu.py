@@ -23,10 +23,13 @@ PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _M
 
 
 def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, MockupUnit]:
-    """Return the FMU of each system by name. Raises `SpecError` that lists all systems without one."""
+    """Return the FMU of each system by name.
+
+    Raises `SpecError` with a list of the systems for which no FMU can be made.
+    """
     from phigen.fmu.archive import unit_of
 
-    # The stack measured by --stack is that of the C alone, without the functions of FMI.
+    # --stack measures the stack of the C alone, without the functions of FMI, so an FMU does not state it.
     collector, units, of_c = Collector(), {}, replace(options, single_file=False, stack=None)
     for compilation in compilations:
         with collector.collecting():

@@ -1,4 +1,4 @@
-"""Generation of files, with the options on which these depend."""
+"""Generation of files, and the options that change the generated files."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Options:
         return compilation if self.stack is None else self._measured(compilation, self.stack)
 
     def _with_changeable_parameters(self, compilation: Compilation) -> Compilation:
-        """The compilation whose C has the function that bindings call to change parameters."""
+        """Return the compilation, extended by the function of the C that bindings call to change parameters."""
         spec, part = compilation.spec, "parameters"
         if part in spec.extras.without and spec.parameters and not spec.lattice:
             message = f"--binding {self.bindings[0]} needs {spec.name}_set_parameters, which `without` leaves out"
@@ -75,7 +75,10 @@ class Options:
         return compilation.including(part)
 
     def _measured(self, compilation: Compilation, flags: str) -> Compilation:
-        """Return the compilation whose header states how much stack its C uses, as gcc with these flags measures it."""
+        """Return the compilation with the size of the stack that its C uses, which the header states.
+
+        gcc measures the size, with the compiler flags ``flags``.
+        """
         from phigen.compiler import emit
         from phigen.runtime.stack import stack_bound
 
@@ -169,7 +172,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
-        # bindings need functions of parameters, which the other options would leave out
+        # bindings add the function that sets parameters; without them, these options would leave it out
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     _expect_steps(compilation, target)

@@ -14,7 +14,7 @@ from phigen.errors import PhigenError
 
 
 class InterruptedRunError(PhigenError):
-    """A run was stopped by the user or by the operating system."""
+    """Error raised after the user or the operating system has stopped a run."""
 
     exit_code = interrupts.CODE
 

@@ -1,4 +1,4 @@
-"""A run of a lattice with the changes that the command line makes, and runs that it continues."""
+"""A run of a lattice, changed by options of the command line, which may continue another run."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZ
 
 @dataclass(frozen=True)
 class LatticeExperiment(Experiment):
-    """Run of a lattice with the changes of the command line.
+    """Run of a lattice, changed by options of the command line.
 
-    ``start`` has the initial state and the parameters. ``past`` is here a `phigen.runtime.lattice_rows.Past`.
-    ``origin`` is the text on provenance that output files contain.
+    ``start`` has the initial state and the parameters. ``past`` is a `phigen.runtime.lattice_rows.Past`, the rows of a
+    finished run that this run continues. ``origin`` is the text on provenance that output files contain.
     """
 
     start: Start | None = None
@@ -48,9 +48,11 @@ class LatticeExperiment(Experiment):
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """Return everything on which the steps depend: initial state, step size, parameters, time, random numbers.
+        """Return everything on which the steps depend: initial state, step size, parameters, time and random
+        numbers.
 
-        With a monitor, a continued run also has the energy level e = −H of the start of the finished run.
+        If there is a monitor and the run continues a finished one, this includes the energy level e = −H at the start
+        of the finished run.
         """
         assert self.start is not None
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
@@ -62,7 +64,7 @@ class LatticeExperiment(Experiment):
         return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws, level=level)
 
     def begun(self, solver: LatticeSolver) -> ObservedCourse:
-        """Return an integration at the start of its steps. Raises `StepError`."""
+        """Return an integration that has not made a step yet. Raises `StepError`."""
         return ObservedCourse.begun(solver, self.beginning(solver))
 
     def function(self, expression: Expression, solver: LatticeSolver) -> Function:
@@ -128,7 +130,8 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
-    # With a monitor, steps are not equal in t, so times do not tell their number. It is 0 for a .csv.
+    # With a monitor, the number of steps does not follow from times, since steps are not equal in t. Then the number in
+    # the file is used, which is 0 for a .csv.
     steps = earlier_run.steps if solver.interface.monitored else steps
     return replace(experiment, past=replace(earlier_run, steps=steps))
 
@@ -152,7 +155,7 @@ def _past_of(path: Path, run: Run, interface: LatticeInterface, shape: tuple[int
 
 
 def _table(path: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
-    """Return the rows of a ``.csv`` of states, which does not contain the number of steps."""
+    """Return the rows of a ``.csv`` file of states. The number of steps is 0, since the file does not contain it."""
     columns = state_columns(interface, shape[1:])
     expected = [name for column in columns for name in column.names]
     with opened_text(path) as file:

@@ -255,7 +255,7 @@ def _draw(
 def exponents_of(
     console: Console, spec: Spec, run: Run, solver: LatticeSolver, start: Start, parameters: Mapping[str, Any]
 ) -> Spectrum:
-    """Return the spectrum of a run with one Lyapunov exponent, the largest. Raises `StepError`."""
+    """Return a spectrum that contains only the largest Lyapunov exponent of a run. Raises `StepError`."""
     from phigen.study.lyapunov import lattice_spectrum
 
     t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
@@ -266,7 +266,7 @@ def exponents_of(
 
 
 def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str, Any]:
-    """Return the parameters of a run, with those of the command line."""
+    """Return the parameters of a run; those given on the command line replace those of the spec."""
     parameters: dict[str, Any] = dict(start.parameters)
     for setting in settings:
         name, value = setting_of(setting)

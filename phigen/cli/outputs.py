@@ -24,8 +24,10 @@ class Change:
 
     @property
     def state(self) -> str:
-        """The state of the file: ``unchanged``, ``missing``, ``different``, or ``stale`` if no spec of this build
-        produces it."""
+        """The state of the file on disk: ``unchanged``, ``missing`` or ``different``.
+
+        The state is ``stale`` if no spec of this build produces the file.
+        """
         if self.before == self.after:
             return "unchanged"
         if self.after is None:

@@ -1,4 +1,4 @@
-"""Runs that start where another run ended: reading its file, and starting a session at its last state."""
+"""Runs that start where another run ended: the file of the other run is read, and the steps start at its last state."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ _EQUAL = 1e-9
 
 @dataclass(frozen=True)
 class StoredRows:
-    """Rows of a finished run, read from its file; ``columns`` has the names of the columns, the first of which is the
-    time."""
+    """Rows of a finished run, read from its file.
+
+    ``columns`` has the names of the columns. The first column is the time.
+    """
 
     columns: tuple[str, ...]
     rows: Floats
@@ -63,7 +65,10 @@ def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
 
 
 def past_of(path: Path, names: Interface, option: str) -> StoredRows:
-    """Return the rows in a file of a run. Raises `click.BadParameter`, which names ``option``, for other files."""
+    """Return the rows that a run has written to the file ``path``.
+
+    Raises `click.BadParameter` with the name ``option`` if the file is not that of a run.
+    """
     try:
         stored_rows = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
         if len(stored_rows.rows):
@@ -109,10 +114,10 @@ def _of_npz(path: Path, names: Interface) -> StoredRows:
 
 
 def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Experiment:
-    """Return the experiment that starts at the last state in ``rows``.
+    """Return the experiment, changed so that it starts at the last state in ``rows``.
 
-    If ``rows`` has an attitude, the experiment starts with it. If H depends on the time, it starts at the time of that
-    state.
+    If ``rows`` has an attitude, the experiment starts with that attitude. If H depends on the time, the experiment
+    starts at the time of that state.
     """
     names = solver.interface
     _, *columns = columns_of(names)
@@ -126,10 +131,10 @@ def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Ex
 
 
 def begun(solver: Solver, experiment: Experiment) -> Session:
-    """Return a session of the solver at the state at which the steps of an experiment start.
+    """Return a session of the solver, at the state from which the steps of an experiment start.
 
-    If the experiment continues a finished run, the session is at the last state of that run, but keeps what was fixed
-    at its first state: the gauge, or with a monitor the energy level e = −H.
+    If the experiment continues a finished run, this is the last state of that run. What was fixed at the first state of
+    that run stays fixed: the gauge, or with a monitor the energy level e = −H.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

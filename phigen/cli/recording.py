@@ -54,7 +54,10 @@ class Files:
 
     @property
     def checkpoint(self) -> Path | None:
-        """Path of the checkpoint, beside the first file; None without files, since such a run cannot be continued."""
+        """Path of the checkpoint, beside the first file; None if there are no files.
+
+        A run without files cannot be continued.
+        """
         first = self.output or self.section
         return first.with_name(first.name + ".checkpoint") if first else None
 
@@ -102,8 +105,8 @@ class Recorder:
             "solver": solver.backend.identity,
         }
         self.session: Session
-        self.number = 0.0  # number of the last row, in steps since the steps began
-        self._whole: int | None = None  # number of whole steps; None until the partial last step has been made
+        self.number = 0.0  # steps from the first state to the last row, with a fraction after a partial step
+        self._whole: int | None = None  # number of whole steps, set when the partial last step has been made
         self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
 
@@ -190,8 +193,10 @@ class Recorder:
             self._tables["section"].append(crossings)
 
     def complete(self) -> None:
-        """Make the partial step at the end, if there is one, and record the last state unless it is the last row
-        already."""
+        """Make the partial step at the end, if there is one, and record the last state.
+
+        The last state is not recorded a second time if it is in the last row already.
+        """
         end, number = self.experiment.end, float(self.session.steps)
         if end is not None:
             session_before = self.session
@@ -227,7 +232,7 @@ class Recorder:
         return path.suffix.lower() == ".csv"
 
     def save(self, seconds: float = 0.0) -> None:
-        """Write all files and a checkpoint to the disk, if the last checkpoint is at least ``seconds`` old."""
+        """Write all files and a checkpoint to the disk, unless the last checkpoint is less than ``seconds`` old."""
         path = self.files.checkpoint
         if path is None or time.monotonic() - self._saved < seconds:
             return
@@ -262,7 +267,7 @@ class Recorder:
         return dict(zip([*names.coordinates, "energy"], pairs, strict=True))
 
     def finish(self, keep: bool) -> None:
-        """Complete the files; with ``keep``, retain the data from which the run can be continued."""
+        """Complete the files. With ``keep``, the checkpoint remains, from which the run can be continued."""
         run, names = self.experiment, np.array(self.solver.coordinates)
         time_before = 0.0
         if run.past:
@@ -289,7 +294,7 @@ class Recorder:
             table.discard()
 
     def trajectory(self, broken: bool) -> Trajectory:
-        """Return the trajectory with the number of rows that a figure can show; ``broken`` says that the run failed."""
+        """Return the trajectory, thinned to as many rows as a figure can show; ``broken`` says that the run failed."""
         names, experiment = self.solver.interface, self.experiment
         settings = experiment.h, self.steps, experiment.parameters
         return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken, names.observables)
@@ -342,9 +347,9 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
 
 @contextmanager
 def _disk_errors_with_hint(recorder: Recorder) -> Iterator[None]:
-    """Context in which an error of the disk, such as lack of space, becomes a `FileError` with a hint how to resume.
+    """Context in which an error of the disk, such as lack of space, becomes a `FileError`.
 
-    Errors of a run without a checkpoint are not changed.
+    The message of the `FileError` says how to resume the run. Errors of a run without a checkpoint are not changed.
     """
     try:
         yield
@@ -410,8 +415,8 @@ def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Float
 class _Rows:
     """Rows at which a classical method is compared with the solver.
 
-    ``numbers`` are the numbers of steps from the start to each row; a fraction means a time within a step. ``count`` is
-    the number of rows.
+    ``numbers`` has one number for each row: the number of steps from the start to that row. A fraction means that the
+    row lies inside a step. ``count`` is the number of rows.
     """
 
     numbers: Iterable[float]

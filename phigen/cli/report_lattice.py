@@ -24,7 +24,7 @@ def gathered_of_lattice(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
-    """Return the content of the page, with one run and its verification, and the errors of its parts."""
+    """Return the content of the page, with one run and its verification, and the errors that occurred in them."""
     from phigen.report.lattice_page import LatticeMaterial
 
     material = LatticeMaterial(examination, compilation, command_line)

@@ -37,7 +37,7 @@ def gathered(
     quick: bool,
     console: Console,
 ) -> tuple[Material, list[PhigenError]]:
-    """Return the content of the page, and the errors of its parts."""
+    """Return the content of the page, and the errors that occurred when its parts were made."""
     from phigen.cli.endings import ended, timed
 
     material = Material(examination, compilation, command_line)
@@ -118,9 +118,10 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Return trajectories of the first steps by the solver and by other methods, with the state after every step.
+    """Return trajectories of the first steps, by the solver and by other methods, with the state after every
+    step.
 
-    The result is empty if the run is short and its trajectory has every step already.
+    The result is empty if the whole run is short, since its trajectory then has every step already.
     """
     from phigen.cli.recording import Files, Recorder, compared
 
@@ -138,7 +139,10 @@ def _opening(
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
-    """Return the content with the constancy of the modified Hamiltonian, or with the reason why it was not measured."""
+    """Return the content with the variation of the modified Hamiltonian along the run.
+
+    If the variation was not measured, the content has the reason instead.
+    """
     from phigen.cli.verify import constancy_of
     from phigen.study.backward import NotOfferedError
 

@@ -57,7 +57,8 @@ def studied(
 def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
     """Return the closed form of the solution as a function of t.
 
-    Returns None if the spec does not give every coordinate, or if a monitor hides the times of steps.
+    Returns None if the spec does not give every coordinate. Returns None also if there is a monitor, since its steps
+    are not equal in t.
     """
     import numpy as np
 
@@ -75,10 +76,10 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """Return a function that maps a state to the largest change of a Casimir since x0; None for systems without
-    Casimirs.
+    """Return a function that maps a state to the largest change of a Casimir since x0.
 
     The change of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for this Casimir.
+    For systems without Casimirs the result is None.
     """
     from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING

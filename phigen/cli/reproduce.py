@@ -52,7 +52,7 @@ def command(console: Console, what: str, folder: Path, suffix: str, names: tuple
 
 
 def described(plates: dict[str, Plate]) -> list[dict[str, Any]]:
-    """Return the titles and findings of figures as data for JSON."""
+    """Return the titles of figures and the numbers measured for them, as data for JSON."""
     return [
         {
             "figure": name,

@@ -22,10 +22,10 @@ sizes_option = click.option(
 
 
 def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
-    """Return the spec with other sizes in the run of that name, by default the first; unchanged if ``text`` is None.
+    """Return the spec with the sizes ``text`` in the run called ``name``, by default the first run.
 
-    Raises `click.BadParameter` for texts that are no sizes, for systems without sizes, and for sizes that are too small
-    for the stencil.
+    Without ``text`` the spec is unchanged. Raises `click.BadParameter` for texts that are no sizes, for systems without
+    sizes, and for sizes that are too small for the stencil.
     """
     if text is None:
         return spec

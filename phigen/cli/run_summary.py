@@ -58,8 +58,10 @@ def counted_crossings(run: Run, count: int, section: str) -> str:
 
 
 def steps_text(recorder: Recorder) -> str:
-    """Return the number of steps in words: "60 steps of 0.1", "in τ" with a monitor, "and a part of one" if the last
-    step was shorter."""
+    """Return the number of steps in words, such as "60 steps of 0.1".
+
+    With a monitor, "in τ" is added; after a shorter last step, "and a part of one".
+    """
     unit = " in τ" if recorder.solver.interface.monitored else ""
     part = " and a part of one" if recorder.number > recorder.steps else ""
     return f"{recorder.steps} steps of {recorder.experiment.h:.9g}{unit}{part}"
@@ -174,7 +176,10 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
 
 
 def described_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the time averages by the names of observables, as data for JSON; ``observables`` selects some."""
+    """Return the time averages by the names of observables, as data for JSON.
+
+    ``observables`` selects some of them; by default all are returned.
+    """
     from dataclasses import asdict
 
     named_results = zip(names, averages.results(), strict=True)

@@ -1,4 +1,4 @@
-"""Text under headings, for terminals."""
+"""Printing of text under headings on terminals."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def _print_collocation(compilation: CompiledGauss) -> None:
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
-    """Return a line that defines those functions in ``lines`` whose names are not standard; [] if there are none."""
+    """Return a line that defines the functions with unusual names that occur in ``lines``; [] if there are none."""
     from phigen.symbolic.readable import UNFAMILIAR
 
     met = [
@@ -221,8 +221,8 @@ def _casimirs(system: System, max_terms: int | None) -> list[tuple[str, str]]:
 def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str, str]]:
     """Return α and β as pairs of name and text.
 
-    For a symmetric bi-realisation, β is shown as α(x, −p). Where α and β are defined by series along a path, the first
-    terms of each are shown.
+    For a symmetric bi-realisation, β is shown as α(x, −p). If α and β are defined by series along a path, the first
+    terms of the series are shown.
     """
     from phigen.notation.named_parts import texts
 
@@ -245,7 +245,10 @@ def _modified(compilation: Compilation, count: int, max_terms: int | None) -> li
 
 
 def _gauged(compilation: CompiledSeries) -> list[str]:
-    """Return a line with H minus multiples of Casimirs, from which the S_i are derived; [] if nothing is subtracted."""
+    """Return a line that names the function from which the S_i are derived, if it is not H.
+
+    This function is H minus multiples of Casimirs. If nothing is subtracted, the result is [].
+    """
     gauge = compilation.gauge
     subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
     return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []

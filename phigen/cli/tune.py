@@ -179,7 +179,7 @@ def problem_of(compilation: Compilation, experiment: Experiment, horizon: float 
 def _of_lattice(
     console: Console, compilation: Compilation, run: Run, settings: tuple[str, ...], horizon: float | None, measure: str
 ) -> Problem:
-    """Return the initial value problem of a run of a lattice, on fewer sites if the run has many."""
+    """Return the initial value problem for a run of a lattice. It has fewer sites than the run if the run has many."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended, length
     from phigen.cli.lattice_experiment import LatticeExperiment
@@ -212,7 +212,7 @@ def _of_lattice(
 
 
 def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """Return a first estimate of the step size, the length of time to integrate, and the sign of the direction of time.
+    """Return a first estimate of the step size; the length of time to integrate; and the sign of the step.
 
     The length is ``horizon``, by default that of the run.
     """

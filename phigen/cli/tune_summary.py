@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Finalist, Tuning
 
-#: Further accuracies for which results are shown, relative to the requested one.
+#: Further accuracies for which results are shown, as multiples of the requested accuracy.
 _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
-#: If the error of the winner is smaller than the accuracy by more than this factor, a remark says that larger steps
-#: fail. An error this small shows that the accuracy did not limit the step.
+#: If the error of the cheapest setting is smaller than the accuracy by more than this factor, a remark says that larger
+#: steps fail. An error this small shows that the accuracy did not limit the step.
 _UNDECIDED_FACTOR = 20
-#: Largest number of monitors in the table; least factor by which a monitor must reduce the number of steps to be
-#: proposed, since each of its steps costs more; number of characters to which formulas in the table are cut.
+#: Largest number of monitors in the table. Least factor by which a monitor must reduce the number of steps; otherwise
+#: it is not proposed, since each step with a monitor costs more. Number of characters to which formulas in the table
+#: are cut.
 _MOST_MONITORS, _LEAST_GAIN, _FORMULA_LENGTH = 5, 2.0, 60
 #: Number of states that the proposed run of an ordinary system stores, enough for a figure.
 _STORED_STATES = 1000
@@ -121,7 +122,10 @@ def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
 
 
 def gauge_of(curve: Curve) -> str:
-    """Return how the gauge of a method is chosen, as in the spec; "none" without a gauge, "" for classical methods."""
+    """Return how the gauge of a method is chosen, in the words of the spec.
+
+    Returns "none" for methods without a gauge, and "" for classical methods.
+    """
     if curve.setting is None:
         return ""
     return curve.setting.gauge if curve.gauged else "none"
@@ -177,7 +181,10 @@ def remarks(tuning: Tuning) -> Iterator[str]:
 
 
 def _automatic(tuning: Tuning) -> str:
-    """Return a sentence that names the scheme that ``scheme: auto`` chooses, and compares its time with the best."""
+    """Return a sentence on the scheme that ``scheme: auto`` chooses.
+
+    It compares the time that this scheme needs with the time of the best setting.
+    """
     assert tuning.winner is not None
     ratio, text = (
         tuning.automatic_ratio,
@@ -223,7 +230,7 @@ def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
     assert tuning.winner is not None
     step = tuning.winner.point.step
     steps = max(1, round(tuning.horizon / step)) + (run.stop is not None)
-    # states of lattices are large, so the tuned run stores at most as many as the run of the spec
+    # states of lattices are large, so the proposed run stores at most as many as the run of the spec
     rows = max(1, run.steps // run.stride) if tuning.sizes else _STORED_STATES
     return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 

@@ -45,7 +45,7 @@ class VendorRequest:
 
 @dataclass(frozen=True)
 class VendoredSolver:
-    """Files (name → text) that the folder should contain for one solver, and the request for that solver."""
+    """Solver in a folder of another project: the request for it, and the files (name → text) that it should have."""
 
     order: VendorRequest
     compilation: Compilation
@@ -172,8 +172,10 @@ def _from_specs(
 
 
 def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector: Collector) -> list[VendorRequest]:
-    """Return requests for all solvers in the manifest, with the spec from its file or else from the copy in the
-    manifest."""
+    """Return requests for all solvers in the manifest.
+
+    The text of a spec comes from its file, or if the file is absent from the copy in the manifest.
+    """
     from phigen import spec as specs
 
     orders = []
@@ -305,9 +307,9 @@ def _problems(
 
 
 def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
-    """Return the problem with a file, "" if there is none, and whether its correction needs ``--force``.
+    """Return the problem with a file, and whether its correction needs ``--force``.
 
-    Files that were edited by hand need ``--force``.
+    If there is no problem, the text is "". Files that were edited by hand need ``--force``.
     """
     content = path.read_bytes() if path.is_file() else None
     stated, expected = entry.files.get(path.name) if entry else None, vendored.files.get(path.name)

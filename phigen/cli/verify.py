@@ -121,7 +121,7 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
-    """Return how much the modified Hamiltonian, with 0, 1, … of its corrections, changes along a run.
+    """Return how much the modified Hamiltonian changes along a run, for each number 0, 1, … of its corrections.
 
     Raises `NotOfferedError` and `StepError`.
     """
@@ -193,7 +193,7 @@ def verified_lattice(
 
 
 def missed_bounds(verification: Verification) -> CheckError:
-    """Return the error that lists the checks with missed bounds."""
+    """Return the error that lists the checks whose measured value misses its bound."""
     lines = [f"{verification.name}: verification failed", *(f"  {f}" for f in verification.failures)]
     return CheckError("\n".join(lines))
 
