@@ -24,7 +24,7 @@ SOURCE = 100_000
 
 
 def document(material: Material) -> str:
-    """Return the HTML of the page. Measured times are its only content that does not depend on the arguments."""
+    """Return the HTML of the page with the content ``material``."""
     spec = material.compilation.spec
     solvers = script(material.live) if material.live and material.live.solvers else ""
     return page.page(
@@ -33,7 +33,7 @@ def document(material: Material) -> str:
 
 
 def lead(compilation: Compilation) -> Markup:
-    """Return the introduction of the page."""
+    """Return the head of the page: its title, the description of the spec, and the references."""
     spec = compilation.spec
     return page.block(
         "lead",

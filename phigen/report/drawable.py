@@ -1,4 +1,4 @@
-"""Availability of figures: matplotlib is optional."""
+"""Check whether figures can be drawn: this needs matplotlib, which is optional."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ NO_FIGURES = f"There are no figures on this page, since matplotlib was not insta
 
 
 def drawable() -> bool:
-    """Return whether figures can be drawn."""
+    """Return whether matplotlib is installed, so that figures can be drawn."""
     return find_spec("matplotlib") is not None

@@ -13,8 +13,8 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Size of a group of formulas, counted as the names and numbers in it, above which the page shows the group folded, and
-#: above which the page leaves it out.
+#: Limits of the size of a group of formulas, which is the number of names and numbers in it. The page folds groups
+#: larger than FOLDED, and leaves out groups larger than LEFT_OUT.
 FOLDED, LEFT_OUT = 160, 4_000
 #: Largest number of terms of a polynomial that the page contains; longer ones are abbreviated.
 MOST_TERMS = 150
@@ -27,9 +27,9 @@ def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str
 
 
 def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, sign: str = "=") -> Markup:
-    """Return equations as HTML, with ``left`` sides as MathML; common subexpressions get names.
+    """Return equations as HTML. ``left`` contains the left-hand sides as MathML.
 
-    Long groups are folded, or left out. ``subject`` is their title.
+    Common subexpressions get names. Long groups are folded, or left out; then ``subject`` is their title.
     """
     formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:

@@ -1,4 +1,4 @@
-"""Tables of the compiler's choices, of proofs and of measurements."""
+"""Sections of a page with tables: choices of the compiler, proofs, measurements, and errors of runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from phigen.study.summary import Drift, Summary
 from phigen.study.verification import Check, Verification
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
 
-#: Tile of the summary, a large number with a label: CSS class, value, label, note.
+#: Tile of the summary, which shows a large number with a label: CSS class, number, label, note.
 Tile = tuple[str, str, str, str]
 
 _GOOD, _BAD, _UNSURE = "good", "bad", "unsure"

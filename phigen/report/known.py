@@ -1,4 +1,4 @@
-"""Formulas of the theory, which do not depend on the system, as pieces of MathML."""
+"""Formulas of the theory, as pieces of MathML. They do not depend on the system."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ _HALF_ROOT = f"<mfrac><msqrt>{_s}</msqrt><mn>2</mn></mfrac>"
 #: The equations of motion.
 MOTION = [math(f'<mover accent="true">{_x}<mo>˙</mo></mover>{_o("=")}{_of(_i("π"), _x)}<mi>∇</mi>{_of(_i("H"), _x)}')]
 
-#: Equations of a step from x_n to x_{n+1}: STEP by α and β; PATH_STEP for bi-realisations that are defined by the path
-#: ṁ = π(m)p.
+#: Equations of a step from x_n to x_{n+1}. STEP has the form with α and β. PATH_STEP is for bi-realisations that are
+#: defined by the path ṁ = π(m)p.
 STEP = [
     [math(f"{_of(_i('α'), _y, _SLOPE)}{_o('=')}{_x_n}"), " solved for ", math(_y) + ", "],
     [math(f"{_x_next}{_o('=')}{_of(_i('β'), _y, _SLOPE)}")],

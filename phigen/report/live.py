@@ -1,4 +1,4 @@
-"""Live panel of a page: it runs the generated JavaScript and RK4, with sliders for all settings."""
+"""Live panel of a page, which runs the generated JavaScript beside RK4, with sliders for all settings."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders that the panel offers in addition to the order of the page; largest number of characters that the JavaScript
-#: of all orders may have.
+#: Orders that the panel offers in addition to the order of the page; and largest number of characters of the JavaScript
+#: for all these orders together.
 ORDERS, MOST = (2, 4), 200_000
-#: FEW: largest number of sliders of a group that is shown unfolded. COORDINATES: largest number of coordinates with
+#: FEW: groups with at most this number of sliders are shown unfolded. COORDINATES: largest number of coordinates with
 #: sliders. STEP, SPEED, PARAMETER: largest factors by which sliders change the step, the speed and a parameter.
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
@@ -58,10 +58,11 @@ class Live:
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the panel: the setting that it changes, and how far.
+    """Slider of the panel, which changes one setting.
 
-    On the scale "log" the ends are the default value times and divided by ``reach``; on the scale "linear" they differ
-    from the default value by ``reach``. ``low`` and ``high`` are the positions of the ends.
+    On the scale "log", the ends of the slider stand for the default value multiplied and divided by ``reach``. On the
+    scale "linear", they stand for the default value plus and minus ``reach``. ``low`` and ``high`` are the positions of
+    the ends.
     """
 
     label: Markup | str
@@ -90,10 +91,10 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """Return the solvers in JavaScript (order → text) for the order of the page and for ``orders``, and "".
+    """Return the solvers in JavaScript (order → text), and "", for the order of the page and for ``orders``.
 
-    If there are none, the mapping is empty, and the text is the reason. ``spec`` replaces the spec of the compilation;
-    it may only have other observables.
+    If there can be no solvers, the mapping is empty, and the text is the reason. ``spec`` replaces the spec of the
+    compilation, from which it may differ only in its observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
@@ -123,9 +124,9 @@ def emits(compilation: Compilation) -> bool:
 
 
 def enclosed(module: str) -> str:
-    """Return a generated module as the text of a JavaScript function that returns the names which the panel uses.
+    """Return the text of a JavaScript function that contains a generated module.
 
-    Comments are left out.
+    The function returns the names of the module that the panel uses. Comments of the module are left out.
     """
     code = _COMMENT.sub("", module).replace("export class", "class")
     lines = (line.strip() for line in code.splitlines())
@@ -142,7 +143,7 @@ def script(live: Live) -> str:
 
 
 def function_of(formula: Expression, names: Sequence[str]) -> str:
-    """Return a formula as a JavaScript arrow function of the named symbols."""
+    """Return a formula as a JavaScript arrow function, whose arguments are the symbols ``names``."""
     assignments, (value,) = assign(expand_powers([formula]))
     scope = Scope(LANGUAGE.reserved | set(LANGUAGE.functions.values()))
     arguments = [scope[name] for name in names]
@@ -211,8 +212,10 @@ def slid(slider: Slider) -> Markup:
 
 
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
-    """Return for phigen and for RK4: number of the colour, id of the canvas, name, id of the label, text of the
-    label."""
+    """Return the texts of the two halves of the panel, for phigen and for RK4.
+
+    Each entry has the number of the colour, the id of the canvas, the name of the method, and id and text of the label.
+    """
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
         (2, "theirs", "RK4", "id=live-cost", ""),
@@ -222,8 +225,10 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 def quantity(
     name: str, casimirs: Sequence[int] | None = None, invariants: Sequence[int] | None = None
 ) -> dict[str, object]:
-    """Return a conserved quantity as data for the page: some Casimirs or invariants, given by their indices, else
-    the energy."""
+    """Return a conserved quantity as data for the page.
+
+    The indices ``casimirs`` or ``invariants`` select the quantity; without them it is the energy.
+    """
     return {"name": name, "casimirs": casimirs, "invariants": invariants}
 
 
@@ -244,7 +249,7 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _casimir_label(system: System, casimirs: Mapping[str, int]) -> str:
-    """Return the label of the errors of some Casimirs, given as a mapping from names to indices."""
+    """Return the label for errors of the Casimirs in a mapping from names to indices."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
@@ -259,10 +264,10 @@ def _groups(system: System) -> list[Group]:
 
 
 def _leaf(system: System, group: Group) -> int | None:
-    """Return the index of the Casimir whose level surface is drawn, or None if none is drawn.
+    """Return the index of the Casimir whose level surface is drawn; None if no surface is drawn.
 
-    The Casimir depends only on the three coordinates of the group. For systems of two coordinates the result is −1: the
-    level curve of the energy is drawn.
+    The Casimir depends only on the three coordinates of the group. For a system of two coordinates, the level curve of
+    the energy is drawn instead, and the result is −1.
     """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None

@@ -1,4 +1,4 @@
-"""Live panel of a lattice: it shows its fields, advanced by the generated JavaScript and by RK4."""
+"""Live panel of a lattice, which shows the fields of its sites. The generated JavaScript and RK4 advance them."""
 
 from __future__ import annotations
 
@@ -35,10 +35,11 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: Limits of the sizes that the panel offers, which are those of the run halved and doubled several times: least number
-#: of sites along an axis; largest number of sites of systems of pairs, of chains, and of other lattices.
+#: Limits of the sizes that the panel offers. These are the sizes of the run, halved and doubled several times. FEWEST
+#: is the least number of sites along an axis; the others are the largest numbers of sites of systems of pairs, of
+#: chains, and of other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
-#: Largest number of values in lists of a page, such as listed initial values, parameters and bonds.
+#: Largest total number of values in the lists that a page contains: initial values, parameters and bonds.
 MOST_NUMBERS = 20_000
 
 HELP = {
@@ -53,9 +54,10 @@ _DIRECTION = " The hue is the direction in the plane of {}, {}; lighter colours 
 
 @dataclass(frozen=True)
 class LatticeLive(Live):
-    """Content of the live panel of a lattice: also the ``start`` of the run, and ``formulas`` of starts as JavaScript.
+    """Content of the live panel of a lattice.
 
-    The formulas are functions of site indices and sizes, so the panel can start with other sizes.
+    In addition to the fields of `Live`, it has the ``start`` of the run, and the ``formulas`` of initial values as
+    JavaScript. The formulas are functions of site indices and sizes, so the panel can start with other sizes.
     """
 
     start: Start | None = None
@@ -81,7 +83,9 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}
     for name, density in cell.invariants.items():
-        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # makes names longer than those of the spec
+        apart = "_" * (
+            1 + max(map(len, spec.observables), default=0)
+        )  # makes the new names longer than all names of the spec
         densities[f"{name}{apart}"] = density
         densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
     if not densities:
@@ -92,7 +96,7 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
 
 
 def lattice_script(live: LatticeLive) -> str:
-    """Return the JavaScript of the solvers and of the formulas of starts, for the script of the page."""
+    """Return the JavaScript for the script of the page: the solvers, and the formulas of initial values."""
     return f"{script(live)}\nconst liveValues = {{ {live.formulas} }};"
 
 
@@ -169,7 +173,11 @@ def _picture(compilation: CompiledLattice, start: Start) -> str:
 
 
 def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, list[int]]]:
-    """Return the quantities that can be drawn: name, kind, and the indices of the fields."""
+    """Return the quantities that can be drawn.
+
+    Each entry has a name, the kind of quantity ("field", "direction", "observed" or "energy"), and the indices of
+    fields or observables.
+    """
     fields = compilation.spec.coordinates
     if picture == "moving":
         return [(f"{fields[0]}, {fields[1]}", "field", [0, 1])]
@@ -257,8 +265,7 @@ def _listed(array: Any) -> list[float]:
 
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
-    """Return the total length of all lists of values, such as initial values and bonds, that the page needs for the
-    run."""
+    """Return the total length of the lists that the page needs for the run: initial values, parameters and bonds."""
     arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
     arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
     return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
@@ -289,7 +296,10 @@ def _sign(spec: Spec, start: Start) -> str:
 
 
 def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
-    """Return the conserved quantities as data: the energy unless time or forces act, and one entry for all Casimirs."""
+    """Return the conserved quantities as data: the energy, and one entry for all Casimirs.
+
+    The energy is left out if H depends on the time or forces act.
+    """
     cell, pushed = compilation.cell, compilation.program.pushed
     quantities: list[dict[str, Any]] = [] if cell.driven else [quantity("energy error")]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}

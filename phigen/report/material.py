@@ -22,12 +22,12 @@ from phigen.symbolic.arrays import Floats
 class Material:
     """Proofs of a spec and measurements on one run. Missing parts are None, and ``notes`` give the reasons.
 
-    ``steps`` describes the steps of the run. ``methods`` are trajectories by label, that of the solver first;
-    ``opening`` contains every step of the beginning of the run if ``methods`` do not. ``section`` consists of the
-    function whose zeros define the Poincaré section, some points (rows, DIM), and the number of all points.
-    ``spectrum`` contains the Lyapunov exponents. ``constancy`` measures the modified Hamiltonian along the run;
-    ``no_constancy`` is the reason if it is missing. ``environment`` describes the conditions of timings. ``command``
-    reproduces the page.
+    ``steps`` describes the steps of the run. ``methods`` are trajectories by the labels of methods; the solver comes
+    first. If the rows of ``methods`` are several steps apart, ``opening`` has trajectories of the first steps, with
+    every step. ``section`` consists of the function whose zeros define the Poincaré section, of some points (rows,
+    DIM), and of the number of all points. ``spectrum`` contains the Lyapunov exponents. ``constancy`` measures the
+    modified Hamiltonian along the run; if it is missing, ``no_constancy`` is the reason. ``environment`` describes the
+    conditions under which times were measured. ``command`` is the command that writes the page again.
     """
 
     examination: Examination

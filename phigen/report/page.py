@@ -1,7 +1,8 @@
-"""HTML of pages: blocks from templates that escape their arguments, and the page around the blocks.
+"""HTML of pages: blocks made from templates, and the page around the blocks.
 
 Text of specs is untrusted, so templates escape it; only text that this package has built is `Markup`. The page declares
-a Content-Security-Policy that allows only its own style sheet and scripts, by their hashes, and no network access.
+a Content-Security-Policy. It forbids all access to the network, and allows only the style sheet and the scripts of the
+page, which it identifies by their hashes.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ from phigen._version import __version__
 #: Cell of a table: its class, and its text or markup.
 Cell = tuple[str, str]
 
-#: Equations are set in columns if there are more than MANY, and none has more than SHORT characters of markup.
+#: Equations are set in columns if there are more than MANY, and each has at most SHORT characters of markup.
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: Scripts of the live panel, which follow the JavaScript of its solvers: CURVES for ordinary systems, FIELDS for
+#: Scripts of the live panel, which stand after the JavaScript of its solvers: CURVES for ordinary systems, FIELDS for
 #: lattices.
 CURVES = ("race.js", "start.js", "curves.js", "live.js")
 FIELDS = ("race.js", "start.js", "fields.js", "live.js")
@@ -81,9 +82,10 @@ def fold(summary: str, body: Markup) -> Markup:
 
 
 def equations(listed: Sequence[Sequence[str]]) -> Markup:
-    """Return equations as HTML. Each is a sequence of pieces of MathML, between which lines may break.
+    """Return equations as HTML.
 
-    Many short equations are set in columns.
+    Each equation is a sequence of pieces of MathML, between which lines may break. Many short equations are set in
+    columns.
     """
     are_short = len(listed) > MANY and all(sum(map(len, parts)) < SHORT for parts in listed)
     return block(
@@ -109,9 +111,10 @@ def page(
     solvers: str = "",
     panel: Sequence[str] = CURVES,
 ) -> str:
-    """Return the page from its introduction ``lead`` and its sections (id, title, body).
+    """Return the page that consists of the introduction ``lead`` and of ``sections`` (id, title, body).
 
-    ``solvers`` is the JavaScript of the solvers of the live panel, ``panel`` the names of its scripts.
+    ``solvers`` is the JavaScript of the solvers of the live panel. ``panel`` has the names of the scripts of the live
+    panel.
     """
     live = [solvers, *map(_asset, panel)] if solvers else []
     return _complete(
@@ -143,7 +146,7 @@ def _minified(script: str) -> str:
 
 
 def _complete(template: str, scripts: Sequence[str], **values: object) -> str:
-    """Return a page with its style sheet, its scripts, and the content security policy that allows only these."""
+    """Return a page with its style sheet, its scripts, and the Content-Security-Policy that allows only these."""
     css, code = "\n".join(map(_asset, _STYLES)), "\n".join(scripts)
     return _environment().get_template(f"{template}.html.jinja").render(
         policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(code)}; "
@@ -160,7 +163,7 @@ def _asset(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """Return the source expression of an inline element in a Content-Security-Policy."""
+    """Return the hash of an inline script or style sheet, as a Content-Security-Policy writes it."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
@@ -179,7 +182,7 @@ def typeset(text: str) -> Markup:
 
 
 def scientific(value: float, digits: int = 2) -> str:
-    """Return a number for readers: 3.1·10⁻⁸, 0.25, 7.99, 0, ∞, and a dash for NaN."""
+    """Return a number as text for readers, such as 3.1·10⁻⁸, 0.25, 7.99, 0 or ∞; NaN becomes a dash."""
     if value != value:
         return "–"
     if value in (float("inf"), float("-inf")):

@@ -16,9 +16,10 @@ class NoPanelError(CheckError):
 
 
 def panel_page(compilation: Compilation, run: Run) -> str:
-    """Return the HTML of a page with only the live panel of a run; the panel has one solver, of the order of the spec.
+    """Return the HTML of a page with only the live panel of a run.
 
-    Raises `NoPanelError`, and `SpecError` for a start that cannot be read.
+    The panel has one solver, whose order is that of the spec. Raises `NoPanelError`, and `SpecError` for initial values
+    that cannot be read.
     """
     live: Live
     spec = compilation.spec

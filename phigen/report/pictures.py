@@ -32,7 +32,8 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
     caption = f"The trajectory of {names}, from the dot at t = {trajectory.t[0]:.9g} to t = {trajectory.t[-1]:.9g}."
-    # For three coordinates, this figure appears only in print and without scripts, instead of the interactive viewer.
+    # With three coordinates, the page shows the interactive viewer in place of this figure. The figure then appears
+    # only in print and where scripts do not run.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
     return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 
@@ -53,7 +54,11 @@ def error_picture(material: Material) -> Markup:
 
 
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
-    """Return the figure of the Poincaré section: some of its ``count`` points, and its ``function``."""
+    """Return the figure of the Poincaré section.
+
+    The figure shows some of the ``count`` crossings. ``function`` is the function whose zeros define the section, as
+    text.
+    """
     shown_points = points[:: max(1, -(-len(points) // ROWS))]
     caption = f"Poincaré section: {count} points where {function} rises through zero"
     caption += f"; {len(shown_points)} of them are drawn." if len(shown_points) < count else "."

@@ -1,6 +1,8 @@
-"""Figures of matplotlib as parts of a page: colours become variables of its style sheet, ids unique, styles attributes.
+"""Figures of matplotlib as parts of a page.
 
-Style attributes and style elements would need an exception from the page's Content-Security-Policy.
+Colours become variables of the style sheet of the page, so that they follow its theme. Ids become unique. Styles become
+attributes of their own, since style attributes and style elements would need an exception from the
+Content-Security-Policy of the page.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"(?:(\w+) )?([\d.]+)px .*")
 #: Colours of figures, and the variables of the style sheet that replace them.
 _COLOURS = {**{value: f"var(--{role})" for role, value in PALETTE.items()}, "#000000": "var(--ink)"}
-#: Pixels of a page for one point of a figure. With this factor the widest figure fills the column.
+#: Pixels of the page for one typographic point of a figure. With this factor the widest figure fills the column of
+#: text.
 PIXELS = 1.75
 #: Elements that a page does not need.
 _DROPPED = (f"{_SVG}metadata", f"{_SVG}style")
@@ -71,6 +74,6 @@ def _identified(element: ElementTree.Element, prefix: str) -> None:
         elif name in ("href", _LINK) and value.startswith("#"):
             element.attrib.pop(name)
             element.set("href", f"#{prefix}{value[1:]}")
-        elif name == _LINK:  # the link of an image contains its data
+        elif name == _LINK:  # the link of an image contains the data of the image, not an id
             element.attrib.pop(name)
             element.set("href", value)

@@ -41,7 +41,10 @@ def _tensor(system: System) -> Markup:
 
 
 def _kinds(system: System) -> Markup:
-    """Return a paragraph that lists the Casimirs, declared or found by phigen, and the further invariants."""
+    """Return a paragraph that lists the Casimirs and the further invariants.
+
+    Casimirs that the spec declares are listed apart from those that phigen found.
+    """
     declared = [c for c in system.casimirs if c in system.declared]
     undeclared = [c for c in system.casimirs if c not in system.declared]
     kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", undeclared)]

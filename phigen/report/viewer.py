@@ -1,4 +1,4 @@
-"""Data for the viewer of a page: trajectories, thinned and rounded to the resolution of a screen."""
+"""Data for the interactive viewer of a page: trajectories with as many rows and digits as a screen can show."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: MOST_NUMBERS: largest number of values in all curves. MOST_ROWS: largest number of rows of a curve. STEPS: largest of
-#: the integers from 0 on to which coordinates are rounded.
+#: MOST_NUMBERS: largest number of values in all curves. MOST_ROWS: largest number of rows of a curve. STEPS:
+#: coordinates are rounded to integers from 0 to this number.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
 #: Largest number of curves in the viewer.
 CURVES = 2
@@ -31,8 +31,9 @@ def viewer(
 ) -> Markup:
     """Return the viewer of the first two trajectories; empty if no curve can be drawn.
 
-    If the rows of the whole run are too far apart for a line, the viewer shows ``opening``, the first steps of the same
-    methods. The leaf of one of the ``casimirs`` is drawn if it is a surface or curve in the initial axes.
+    If the rows of the whole run are too far apart to be joined by lines, the viewer shows ``opening``, the first steps
+    of the same methods. If the level set of one of the ``casimirs`` is a surface or a curve in the initial axes, it is
+    drawn too.
     """
     first = next(iter(methods.values()), None)
     if first is None:
@@ -58,7 +59,7 @@ def viewer(
 
 
 def _until(methods: Mapping[str, Trajectory], trajectories: Mapping[str, Trajectory]) -> str:
-    """Return a sentence that says up to which time the curves go, or "" if they show the whole run."""
+    """Return a sentence that says at which time the curves end; "" if they show the whole run."""
     end, shown_end = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, trajectories))
     return f" It shows the first part of the run, up to t = {shown_end:.6g}." if abs(shown_end) < abs(end) else ""
 
@@ -111,14 +112,18 @@ def _integer_columns(points: Floats) -> list[list[int | None]]:
 
 
 def _finite(trajectory: Trajectory) -> Any:
-    """Return coordinates and time, as columns, of the rows before the first state that is not finite."""
+    """Return the rows before the first state that is not finite. The columns are the coordinates, and the time last."""
     nonfinite_rows = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
     end = int(nonfinite_rows[0]) if len(nonfinite_rows) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
 
 
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
-    """Return the three columns shown first: coordinates of the largest group, then other coordinates or the time."""
+    """Return the indices of the three columns that are shown at first.
+
+    These are the coordinates of the largest group; if the group has fewer than three, other coordinates or the time are
+    added.
+    """
     group = max(groups(coordinates), key=len)
     columns = [coordinates.index(c) for c in group][:3]
     other_columns = [i for i in range(len(coordinates)) if i not in columns] if len(columns) > 2 else []
