@@ -13,7 +13,7 @@ from phigen.study.backward import Constancy
 
 
 def draw_along(axes: Any, constancy: Constancy) -> None:
-    """Draw the error of H̃ over time, with a curve for each number of corrections."""
+    """Draw the error of the modified Hamiltonian H̃ over time, with a curve for each number of corrections."""
     for m, errors in enumerate(constancy.errors):
         t, values = windowed_maxima(constancy.times, errors)
         axes.plot(t, np.where(values > 0, values, np.nan), linewidth=1.0, **_style(m))
@@ -22,7 +22,11 @@ def draw_along(axes: Any, constancy: Constancy) -> None:
 
 
 def draw_against_step(axes: Any, constancy: Constancy) -> None:
-    """Draw the largest error of H̃ over the step size, with a thin line of the expected power beside each curve."""
+    """Draw the largest error of the modified Hamiltonian H̃ over the step size.
+
+    There is a curve for each number of corrections. A thin line beside it has the slope of the expected power of the
+    step.
+    """
     for m, power in enumerate(constancy.powers):
         changes = constancy.changes[:, m]
         axes.plot(constancy.sizes, np.where(changes > 0, changes, np.nan), linewidth=1.0, marker="osD"[m % 3],

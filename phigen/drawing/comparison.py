@@ -16,9 +16,9 @@ _MARKERS = "osD^vXP*"
 
 @styled
 def figure(comparison: Comparison, title: str) -> Figure:
-    """Return the figure, with energy errors on the left, and orbit errors on the right if they are known.
+    """Return the figure: energy errors on the left, and on the right orbit errors, if they are known.
 
-    Filled points are methods whose steps are Poisson maps.
+    Methods whose steps are Poisson maps have filled points.
     """
     from matplotlib.figure import Figure
 

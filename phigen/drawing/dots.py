@@ -1,4 +1,4 @@
-"""Many dots drawn as one path, which takes a tenth of the bytes of markers in an SVG file."""
+"""Drawing of many dots as one path. In an SVG file, markers would take ten times as many bytes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def draw_dots(axes: Any, points: Floats, colour: str, size: float, order: float,
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    # Some programs do not draw lines of length 0, so each dot is a line of a small length.
+    # Some programs do not draw lines of length 0, so each dot is a line that is a little longer.
     offset = 1e-5 * np.max(np.abs(points), axis=0, initial=1e-300)
     vertices = np.stack([points, points + offset], axis=1).reshape(-1, 2)
     path = Path(vertices, np.tile([Path.MOVETO, Path.LINETO], len(points)).astype(np.uint8))

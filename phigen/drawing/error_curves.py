@@ -17,20 +17,20 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Number of windows of a long run; only the largest error in each window is drawn.
+#: A long run is divided into this number of windows; only the largest error in each window is drawn.
 WINDOWS = 400
-#: Title of the panel of an energy that is not conserved.
+#: Title of the panel that shows H over time, for systems that do not conserve H.
 HAMILTONIAN = "H(t)"
 #: Height of a row of panels in inches.
 ROW = 2.3
-#: Spacing of doubles at 1, drawn as a line: relative errors of this size are rounding errors.
+#: Distance from 1 to the next double. Relative errors of this size are rounding errors; a line marks it.
 ROUNDING = 2.0**-52
 
 LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
-    """Return the largest value in each window of rows, and its time.
+    """Return the largest value in each of a number of windows of rows, and the time of that value.
 
     A window with a value that is not finite gives NaN. All rows are returned if there are at most twice as many rows as
     windows.
@@ -60,11 +60,11 @@ def draw_errors(
     methods: Mapping[str, Trajectory],
     units: Mapping[str, Unit] | None = None,
 ) -> None:
-    """Draw a panel for the energy and for each Casimir, with a curve for each method; the first method is drawn on top.
+    """Draw a panel for the energy and one for each Casimir, with a curve for each method.
 
-    Errors are in ``units``. Without units, they are relative to the initial value, or absolute if this is 0. For
-    quantities that are not conserved, because of time, forces or noise, the panel shows values instead of errors, such
-    as H(t).
+    The first method is drawn on top. Errors are in ``units``. Without units, they are relative to the initial value, or
+    absolute if the initial value is 0. If time, forces or noise change a quantity, the panel shows its values, such as
+    H(t), instead of its errors.
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -106,7 +106,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     positive = np.concatenate([values[values > 0] for _, values in curves.values()])
     low, high = (positive.min(), positive.max()) if len(positive) else (ROUNDING, ROUNDING)
     lowest, highest = math.floor(math.log10(low)), max(math.ceil(math.log10(high)), math.floor(math.log10(low)) + 1)
-    # A logarithmic scale has no zero, so zeros are drawn one decade below the smallest error.
+    # A logarithmic scale has no place for 0, so errors of 0 are drawn one decade below the smallest error.
     zeros = any((values == 0).any() for _, values in curves.values())
     zero = 10.0 ** (lowest - 0.8)
     axes.set(yscale="log", ylim=(10.0 ** (lowest - (1.4 if zeros else 0.1)), 10.0 ** (highest + 0.1)))

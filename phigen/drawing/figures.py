@@ -1,8 +1,8 @@
 """Figures of runs: trajectories, errors of conserved quantities, Poincaré sections, convergence, work.
 
 Each function returns a `matplotlib.figure.Figure`, and does not change matplotlib's global state. Colours are those of
-`phigen.drawing.palette.PALETTE`; the functions `save` and `svg` of that module write equal figures with equal bytes.
-matplotlib is the optional extra ``plot``; without it every function raises `MissingPackageError`.
+`phigen.drawing.palette.PALETTE`. The functions `save` and `svg` of that module write equal figures with equal bytes.
+matplotlib is not required by phigen; without it, every function raises `MissingPackageError`.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ _SECTION, _SQUARE = 3.4, 3.8
 def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
     """Return a figure of a trajectory in phase space: in a plane, in space, or as several projections.
 
-    For three coordinates, the symplectic leaf is drawn too: the surface on which the first of the ``casimirs``
-    (formulas by name) is constant.
+    For three coordinates, the symplectic leaf is drawn too. This is the surface on which the first of the ``casimirs``
+    (formulas by name) has its initial value.
     """
     _, columns = phase_space.grid(trajectory.coordinates)
     figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
@@ -61,10 +61,11 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 @styled
 def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
-    """Return a figure with the errors of energy and Casimirs of several methods over time, one panel per quantity.
+    """Return a figure with the errors of energy and Casimirs over time, for several methods.
 
-    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. For long runs, the largest errors in some
-    hundred windows of time are drawn. Zeros have a separate tick 0; a cross marks the time at which a method failed.
+    Each quantity has a panel. Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. A long run is
+    divided into some hundred windows of time, and only the largest error in each window is drawn. Errors of 0 are drawn
+    at a separate tick. A cross marks the time at which a method failed.
     """
     figure = _figure(error_curves.height(methods))
     error_curves.draw_errors(figure, methods, units)
@@ -73,7 +74,7 @@ def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | 
 
 @styled
 def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
-    """Return a figure of Poincaré sections, each an array of points (rows, DIM) by its label.
+    """Return a figure of Poincaré sections. The mapping has an array of points (rows, DIM) for each label.
 
     The figure shows the plane of two of the coordinates ``names``.
     """
@@ -84,7 +85,10 @@ def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figu
 
 @styled
 def convergence_figure(study: Study) -> Figure:
-    """Return a figure of final errors over the step size: for each method a curve, and a thin line of its order."""
+    """Return a figure of final errors over the step size, with a curve for each method.
+
+    A thin line has the slope that the order of the first method predicts.
+    """
     figure = _figure(_SQUARE, NARROW)
     precision_curves.draw_convergence(figure.add_subplot(), study)
     return figure
@@ -102,7 +106,10 @@ def work_precision_figure(study: Study) -> Figure:
 
 @styled
 def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
-    """Return a figure of errors over computing time for all candidates of a tuning, with the proposals."""
+    """Return a figure of errors over computing time for all settings that a tuning has tried.
+
+    Stars mark the proposals.
+    """
     figure = _figure(1.2 * _SQUARE, WIDTH)
     if title:
         figure.suptitle(title, fontsize=11)
@@ -112,7 +119,9 @@ def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
 
 @styled
 def constancy_figure(constancy: Constancy) -> Figure:
-    """Return a figure of the errors of H and H̃: along a trajectory, and over the step size."""
+    """Return a figure of the errors of H and of the modified Hamiltonian H̃, along a trajectory and over the
+    step size.
+    """
     figure = _figure(_SQUARE)
     time_panel, step_panel = figure.subplots(1, 2)
     backward_curves.draw_along(time_panel, constancy)
@@ -131,8 +140,8 @@ def run_figure(
 ) -> Figure:
     """Return one figure with all plots of a run.
 
-    It has the trajectory of the first method with its sections and observables, the errors of all methods, and the
-    Lyapunov exponents if there is a ``spectrum``.
+    It shows the trajectory of the first method with its Poincaré sections and observables, the errors of all methods,
+    and the Lyapunov exponents if there is a ``spectrum``.
     """
     first = next(iter(methods.values()))
 

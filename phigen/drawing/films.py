@@ -54,7 +54,10 @@ def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> No
 
 
 def expect_writer(path: Path) -> None:
-    """Raise `MissingPackageError` if the film needs ffmpeg, that is, if it is not a ``.gif``, and ffmpeg is missing."""
+    """Raise `MissingPackageError` if the film needs ffmpeg and ffmpeg is missing.
+
+    All films except ``.gif`` need ffmpeg.
+    """
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
@@ -70,13 +73,15 @@ def _commented(gif: bytes, comment: bytes) -> bytes:
 
 
 def _flat(values: Floats) -> Floats:
-    """Return the values (sizes) of a chain or a plane unchanged; of a three-dimensional lattice, return the plane in
-    the middle of the first axis."""
+    """Return the values (sizes) to draw: those of a chain or a plane unchanged.
+
+    Of a three-dimensional lattice, only the plane in the middle of the first axis is drawn.
+    """
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 
 def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> Any:
-    """Draw a coordinate on a graph, and return the function that shows other values (sites,)."""
+    """Draw a coordinate on a graph. Return the function that replaces the drawn values by others (sites,)."""
     values = run.column(name)
     picture = draw_sites(axes, run.parameters["bonds"], positions, values[0], shades_of(values))
     axes.set_title(name)
@@ -84,7 +89,7 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
 
 
 def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
-    """Draw a coordinate (frames, *sizes) of a chain or plane, and return the function that shows another frame."""
+    """Draw a coordinate (frames, *sizes) of a chain or plane. Return the function that draws another frame instead."""
     first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:

@@ -9,11 +9,12 @@ Group = tuple[str, ...]
 
 
 def groups(coordinates: Sequence[str]) -> list[Group]:
-    """Return the coordinates in groups of up to three, in order. Single coordinates are drawn over time.
+    """Return the coordinates in groups of up to three, in order. A group of one coordinate is drawn over time.
 
     Up to three coordinates are one group. Otherwise each position is paired with its momentum, by names such as q and
-    p, q1 and p1, x and px. If there are exactly two positions, they form one group, the orbit in a plane, and the
-    momenta another. Without pairs, neighbours with the same letters or the same number form a group.
+    p, q1 and p1, x and px. If there are exactly two pairs, the two positions form one group, which shows the orbit in a
+    plane, and the two momenta form another. If not all coordinates belong to pairs, neighbours with the same letters or
+    the same number form a group.
     """
     names = tuple(coordinates)
     if len(names) <= 3:
@@ -64,10 +65,10 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 
 
 def _parts(run: Group) -> list[Group]:
-    """Return a long group split into groups of three or two names.
+    """Return the groups of two or three names into which a long group is split.
 
-    The groups have three names if the long group begins with x, y, z or its length is divisible by 3, else two. If the
-    length is odd, the first group has three names.
+    The groups have three names if the long group begins with x, y, z or if its length is divisible by 3; otherwise they
+    have two. If the length is odd then, the first group has three names.
     """
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]

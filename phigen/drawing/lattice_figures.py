@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 #: Largest number of coordinates that get a panel; largest number of times in a diagram; number of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Largest number of sites of a graph that is drawn with its bonds; files with larger graphs at several times would be
-#: too large.
+#: Largest number of sites of a graph that is drawn with its bonds. It is drawn at several times, so that figures of
+#: larger graphs would be too large as files.
 MOST_DRAWN = 100
 #: Number of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48
@@ -50,8 +50,8 @@ def lattice_figure(
 
     If time, forces or noise change the energy, H(t) is drawn instead of its error. For systems of pairs, the paths in
     the plane of the first two coordinates are drawn. ``site_names`` are names of the sites of graphs and pairs. Further
-    panels show observables over time, S(q, ω), a correlation, and Lyapunov exponents, if available. A diagram has at
-    most ``dots`` dots along the time axis.
+    panels show observables over time, the dynamic structure factor S(q, ω), a correlation, and Lyapunov exponents, if
+    the run has them. A diagram has at most ``dots`` dots along the time axis.
     """
     from matplotlib.figure import Figure
 
@@ -101,7 +101,7 @@ def lattice_figure(
 
 @styled
 def series_figure(run: LatticeSeries, title: str) -> Figure:
-    """Return a figure of the recorded series of a run without frames."""
+    """Return a figure of the quantities that a run has recorded over time instead of its states."""
     from matplotlib.figure import Figure
 
     names = [*run.columns][: 2 * MOST_PANELS]
@@ -116,8 +116,8 @@ def series_figure(run: LatticeSeries, title: str) -> Figure:
 def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
     """Return a figure of the ``energies`` (frames, *sizes) of the sites.
 
-    If sites have Casimirs, a second panel shows how much these change: the largest change of all sites, and its
-    standard deviation.
+    If sites have Casimirs, a second panel shows the changes of these Casimirs: the largest change of all sites, and the
+    standard deviation over the sites.
     """
     from matplotlib.figure import Figure
 
@@ -185,7 +185,7 @@ def _draw_diagram(
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
     """Return the indices of at most ``dots`` frames at about equal intervals of time."""
-    apart = np.diff(run.t[:-1])  # without the last interval, which may be shorter
+    apart = np.diff(run.t[:-1])  # the last interval is left out, since it may be shorter
     if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
         return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     order = np.argsort(run.t)
@@ -219,7 +219,8 @@ def _draw_graph(
 def draw_sites(axes: Any, bonds: Any, positions: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
     """Draw the sites and bonds of a graph, and return the matplotlib artist of the sites.
 
-    The sites have the colours ``shades`` (see `shades_of`) of the values (sites,).
+    The colours of the sites show the ``values`` (sites,). ``shades`` is the colour map and its scale, as `shades_of`
+    returns them.
     """
     from matplotlib.collections import LineCollection
 
@@ -241,8 +242,10 @@ def _snapshots(run: LatticeTrajectory) -> Any:
 
 
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
-    """Draw one coordinate of a plane at several times. Of a three-dimensional lattice, the plane in the middle of
-    the first axis is drawn."""
+    """Draw one coordinate of a plane at several times.
+
+    Of a three-dimensional lattice, the plane in the middle of the first axis is drawn.
+    """
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
     shades = shades_of(planes, LEVELS)

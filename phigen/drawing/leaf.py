@@ -1,4 +1,7 @@
-"""Symplectic leaf in space: the surface on which a Casimir is constant, drawn as a net of its sections with planes."""
+"""Symplectic leaf in space: the surface on which a Casimir is constant.
+
+It is drawn as a net of the curves in which it meets planes.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,8 @@ import numpy as np
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
-#: Number of planes perpendicular to each axis; number of grid points along a side of a plane; number of Newton steps
-#: that move the lines in a plane onto the surface.
+#: Number of planes perpendicular to each axis. Number of grid points along a side of a plane. Number of Newton steps
+#: that move the points of a line onto the surface.
 CUTS, GRID, NEWTON_STEPS = 9, 41, 8
 
 
@@ -38,9 +41,10 @@ def leaf_of(
     start: Mapping[str, float],
     parameters: Mapping[str, float],
 ) -> Leaf | None:
-    """Return the leaf through the point ``start`` of the first Casimir that depends on no coordinates but ``names``.
+    """Return the leaf through the point ``start``.
 
-    Returns None if there is no such Casimir, or if there are not three names.
+    It belongs to the first Casimir that depends on no coordinates except ``names``. Returns None if there is no such
+    Casimir, or if there are not three names.
     """
     for casimir in casimirs.values():
         used_names = set(symbols_of(casimir)) & set(start)
@@ -53,7 +57,7 @@ def leaf_of(
 def around(leaf: Leaf, box: Floats) -> Floats:
     """Return the box (2, 3) of lower and upper bounds, enlarged so that it contains the whole leaf.
 
-    It is returned unchanged if the leaf is not a closed surface, or much larger than the box.
+    The box is returned unchanged if the leaf is not a closed surface, or if the leaf is much larger than the box.
     """
     middle, half_width = box.mean(axis=0), float(np.max(box[1] - box[0]))
     large_box = np.stack([middle - half_width, middle + half_width])
@@ -79,7 +83,7 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
 
 
 def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
-    """Return the lines of the leaf in the plane x_axis = ``level``, linearly interpolated on a grid."""
+    """Return the lines in which the leaf meets the plane x_axis = ``level``, linearly interpolated on a grid."""
     from contourpy import contour_generator
 
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
@@ -91,10 +95,10 @@ def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Fl
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
-    """Return the line (points, 3) after Newton steps that move its points onto the surface C = level.
+    """Return the line (points, 3), moved onto the surface C = level by Newton steps.
 
     The points stay in the plane of the line, which is perpendicular to ``axis``. Points at which Newton's method fails,
-    as at a pole of C, are left out, so the line may fall into several.
+    for instance at a pole of C, are left out. Therefore several lines may result.
     """
     points = line.copy()
     with np.errstate(all="ignore"):

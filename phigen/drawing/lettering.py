@@ -1,4 +1,7 @@
-"""Ticks and axis names of panels in space, placed by measured text sizes, since matplotlib only estimates positions."""
+"""Ticks and axis names of panels in space.
+
+matplotlib only estimates where they have room; here they are placed by the measured sizes of texts.
+"""
 
 from __future__ import annotations
 
@@ -10,21 +13,22 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Fraction of an axis, at both of its ends, that has no ticks, since two axes meet there.
+#: This fraction of an axis at each end has no ticks, since two axes meet there.
 CORNER = 0.08
-#: Number of characters of a tick label that fit beside the vertical axis, and width of each further character in
-#: points.
+#: LETTERS: number of characters of a tick label that fit beside the vertical axis. WIDTH: width of each further
+#: character in points.
 LETTERS, WIDTH = 4, 2.2
-#: Distance of one move of a name in points, largest number of moves, and least distance between texts in pixels.
+#: PAD: distance in points by which a name is moved at once. MOST_MOVES: largest number of moves. GAP: least distance
+#: between texts in pixels.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def letter(axes: Any, names: tuple[str, ...], box: Floats, max_ticks: int) -> None:
-    """Set ticks and names of the axes of a panel in space that shows the ``box`` (2, 3), with about ``max_ticks`` ticks
-    each.
+    """Set ticks and names of the axes of a panel in space that shows the ``box`` (2, 3).
 
-    If the ticks show values divided by a power of ten, the power is added to the name of the axis.
+    Each axis has about ``max_ticks`` ticks. If the ticks show values divided by a power of ten, the name of the axis
+    contains this power.
     """
     for axis, name, (low, high) in zip(_axes(axes), names, box.T.tolist(), strict=True):
         ticks = _ticks(low, high, max_ticks)
@@ -59,7 +63,7 @@ def move_apart(figure: Figure) -> None:
         figure.draw_without_rendering()
         names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
         meeting = [axis for axes in spaces for axis in _meeting(axes)]
-        # Layouts of matplotlib reserve space for ticks, but not for names of axes in space.
+        # The layout of matplotlib reserves space for ticks, but no space for the names of axes in space.
         overhang = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
         left, right = max(left, left - overhang[0]), max(right, right + overhang[1])
         if not meeting and overhang[0] >= 0 and overhang[1] <= 0:

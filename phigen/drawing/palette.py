@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Colours by their roles. No two are equal, and SVG files contain them literally, so that a page can replace them by
-#: its own variables. The colours of series have a contrast of at least 3 to white and to black, and are distinguishable
-#: with every kind of colour vision (Okabe and Ito, with the light colours darkened).
+#: Colours by their roles. SVG files contain the colours literally, and a page replaces each by a variable of its style
+#: sheet; therefore no two colours are equal. The colours of series have a contrast of at least 3 to white and to black.
+#: Readers with every kind of colour vision can distinguish them (Okabe and Ito, with the light colours darkened).
 PALETTE: Mapping[str, str] = {
     "paper": "#ffffff",
     "ink": "#24292f",
@@ -39,7 +39,7 @@ PALETTE: Mapping[str, str] = {
 DARK: Mapping[str, str] = {"paper": "#0d1117", "ink": "#e6edf3", "muted": "#9198a1", "grid": "#30363d"}
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
-#: Command that installs the packages of the extra ``plot``. It is valid in a checkout and for any release.
+#: Command that installs what figures need. It is valid in a checkout and for any release.
 INSTALLED_BY = "pip install matplotlib"
 
 #: Suffixes of files for figures.
@@ -86,7 +86,7 @@ MARK: Mapping[str, Any] = {"color": PALETTE["muted"], "linewidth": 0.8, "linesty
 
 
 def require_matplotlib() -> None:
-    """Raise `MissingPackageError` if matplotlib is not installed, or only in part."""
+    """Raise `MissingPackageError` if matplotlib is not installed, or if parts of it are missing."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
@@ -138,8 +138,8 @@ def save_for_pages(figure: Figure, path: Path) -> None:
 def in_both_themes(svg_text: str) -> str:
     """Return the SVG text with variables in place of the colours that differ between light and dark pages.
 
-    Browsers choose the values by the preference of the reader. Programs that do not support variables need files with
-    literal colours.
+    Browsers give the variables the values that the reader prefers. Programs that do not support variables need files
+    with literal colours.
     """
     for role in DARK:
         svg_text = svg_text.replace(PALETTE[role], f"var(--{role})")
@@ -168,5 +168,5 @@ def _rendered(
 
 
 def _shortened(text: bytes) -> bytes:
-    """Round positions in an SVG file to a thousandth of a point, which makes long curves shorter."""
+    """Return an SVG file whose positions are cut to three decimals, so that long curves take fewer bytes."""
     return re.sub(rb"(?<=[ML ])(-?\d+\.\d{3})\d+", rb"\1", text)

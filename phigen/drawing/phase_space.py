@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 #: Largest number of coordinates with separate panels; more coordinates are drawn as one image over time.
 MOST_COORDINATES = 24
-#: Rows are not joined by a line if the typical angle between successive chords exceeds the first limit, since the line
-#: would not show the orbit. The second limit applies to long curves, whose chords would cover the panel.
+#: Points are drawn as dots, not joined by a line, if the typical angle between successive chords exceeds TURN, since
+#: the line would not show the orbit. For long curves the limit is FINE_TURN, since their chords would cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
-#: Length, relative to the size of its panel, from which a curve is long.
+#: A curve is long if its length is at least this multiple of the size of its panel.
 LONG = 60.0
-#: Elevation of the view in space, and azimuths to choose from with the default first, in degrees. Number of bands by
-#: distance from the viewer, in which a curve becomes paler towards the back.
+#: Elevation of the view in space, and azimuths to choose from, in degrees; the first azimuth is the default. A curve is
+#: drawn in BANDS parts by distance from the viewer; the farther parts are paler.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
 #: Fraction of a small panel that a box in space fills.
@@ -102,7 +102,8 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
         if lines:
             _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
-    # A long curve has one shade: different shades of the bands would show where its chords happen to end.
+    # A long curve has one shade. Otherwise the shades would change where a chord happens to end, and this would be
+    # visible.
     alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
     _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
@@ -117,9 +118,9 @@ def _directions(azimuth: float) -> Floats:
 
 
 def _azimuth(centred: Floats) -> float:
-    """Return the azimuth of a view that does not look along the plane of the curve.
+    """Return the azimuth of a view in which the curve is not seen edge-on.
 
-    This is the default azimuth, unless another one shows a much larger area.
+    This is the default azimuth, unless the curve has a much larger area in another view.
     """
     spread = centred.T @ centred
 
@@ -135,12 +136,12 @@ def _draw_faded(
     axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
     alphas: tuple[float, float], order: float, as_curve: bool = True,
 ) -> None:  # fmt: skip
-    """Draw points (rows, 3) as a curve in bands of equal colour, by their distance from the viewer."""
+    """Draw points (rows, 3) as a curve in bands by their distance from the viewer; each band has one shade."""
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
-        # A band also contains the point after its last one, so that neighbouring bands join.
+        # A band also contains the point that follows its last point, so that neighbouring bands join.
         in_band = band == level
         band_rows = in_band | np.r_[False, in_band[:-1]] if as_curve else in_band
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
@@ -164,12 +165,12 @@ def _draw_curve(
 
 
 def _width(points: Floats) -> float:
-    """Return the width of a line in points, which is smaller for longer lines."""
+    """Return the width in points with which a line is drawn; longer lines are thinner."""
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
 def joins(points: Floats) -> bool:
-    """Return whether chords between the rows (rows, n) approximate the curve."""
+    """Return whether the chords between successive points (rows, n) show the shape of the curve."""
     points = points[np.isfinite(points).all(axis=1)]
     size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
     chords = np.diff(points / np.where(size > 0, size, 1.0), axis=0)
@@ -200,7 +201,8 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 def box_of(points: Floats) -> Floats:
     """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
 
-    A direction with little extent is widened, unless its values are so small that it has a scale of its own.
+    A direction in which the points extend little is widened. It is not widened if its values are so small that its axis
+    has a scale of its own.
     """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
@@ -212,6 +214,6 @@ def box_of(points: Floats) -> Floats:
 
 
 def _length(points: Floats) -> float:
-    """Return the arc length of a curve after each coordinate is scaled to range 1."""
+    """Return the arc length of a curve whose coordinates are first scaled so that the range of each is 1."""
     size = np.ptp(points, axis=0)
     return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

@@ -14,7 +14,10 @@ _MARKERS = "osD^vX"
 
 
 def draw_convergence(axes: Any, study: Study) -> None:
-    """Draw errors over step size, labelled with observed orders, and a thin line of the order of the first method."""
+    """Draw errors over step size.
+
+    The labels state the observed orders. A thin line has the slope that the order of the first method predicts.
+    """
     for index, curve in enumerate(study.curves):
         slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
         _draw(axes, index, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
@@ -24,7 +27,7 @@ def draw_convergence(axes: Any, study: Study) -> None:
 
 
 def draw_work(axes: Any, study: Study) -> None:
-    """Draw errors of the solution over the duration of a run in seconds."""
+    """Draw errors of the solution over the computing time of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
@@ -32,7 +35,7 @@ def draw_work(axes: Any, study: Study) -> None:
 
 
 def draw_conserved(axes: Any, study: Study) -> None:
-    """Draw the largest error of a Casimir over the duration of a run in seconds."""
+    """Draw the largest error of a Casimir over the computing time of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")

@@ -13,22 +13,22 @@ from phigen.drawing.groups import phase_planes
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: Variation of a coordinate, relative to the largest variation, below which the section counts as fixing this
-#: coordinate.
+#: The section counts as fixing a coordinate if the coordinate varies by less than this fraction of the largest
+#: variation.
 _CONSTANT = 1e-8
 
 
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
-    These are the first pair of conjugate coordinates of which neither is constant, if there is such a pair.
+    They belong to the first pair of conjugate coordinates that both vary, if there is one.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, is_constant in zip(names, constant, strict=True) if not is_constant]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
-    # A closed orbit crosses at a single point, so all coordinates are constant. The coordinate that the section fixes
-    # is probably 0, so the largest coordinates are drawn.
+    # A closed orbit may cross the surface always at the same point; then all coordinates are constant. The surface
+    # probably fixes a coordinate to 0, so the coordinates with the largest values are drawn.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     by_size = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
     columns = (pairs[0] if pairs else [*varying, *by_size])[:2]
@@ -56,7 +56,7 @@ def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]
 
 
 def _widen(axes: Any) -> None:
-    """Widen the axes if all points agree up to rounding, so that rounding errors do not fill the panel."""
+    """Widen the axes if all points agree up to rounding. Otherwise rounding errors would fill the panel."""
     for kind in "xy":
         low, high = getattr(axes, f"get_{kind}lim")()
         middle, half_width = (low + high) / 2, (high - low) / 2

@@ -1,4 +1,6 @@
-"""Colour maps: diverging around 0 for values of both signs, else from the least to the largest value."""
+"""Colour maps. For values of both signs the map diverges around 0; otherwise it extends from the least to the largest
+value.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,10 @@ DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
 
 
 def bounds_of(values: Floats) -> tuple[float, float]:
-    """Return the lower and upper end of a colour scale for values; symmetric about 0 if these have both signs."""
+    """Return the lower and upper end of a colour scale for values.
+
+    If values have both signs, the ends are symmetric about 0.
+    """
     least, largest = float(np.min(values)), float(np.max(values))
     if least < 0 < largest:
         return -max(-least, largest), max(-least, largest)

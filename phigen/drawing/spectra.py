@@ -13,13 +13,17 @@ if TYPE_CHECKING:
 
     from phigen.runtime.spectra import Correlation, DynamicSpectrum
 
-#: Number of decades that are shown below the largest value; smaller values are leakage of the window, and rounding.
+#: Number of decades that are shown below the largest value. Smaller values come from rounding, and from the window
+#: function, which spreads large values over other frequencies.
 DECADES = 6
 
 
 @styled
 def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
-    """Return a figure of log S(q, ω) over ω ≥ 0 and q along the first axis; q = 0 along the other axes."""
+    """Return a figure of log S(q, ω) over ω ≥ 0 and over q along the first axis of the lattice.
+
+    Along the other axes q is 0.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 4.0), layout="constrained")
@@ -28,7 +32,7 @@ def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
 
 
 def draw_correlation(axes: Any, correlation: Correlation) -> None:
-    """Draw the correlation of two fields over the distance."""
+    """Draw the correlation of two fields over the distance of the sites."""
     axes.plot(np.arange(len(correlation.values)), correlation.values, ".-", linewidth=1.0)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.set(
@@ -38,7 +42,7 @@ def draw_correlation(axes: Any, correlation: Correlation) -> None:
 
 
 def draw_spectrum(figure: Any, spectrum: DynamicSpectrum, title: str = "") -> None:
-    """Draw log S(q, ω) in a figure or subfigure, over ω ≥ 0 and q along the first axis."""
+    """Draw log S(q, ω) in a figure or subfigure, over ω ≥ 0 and over q along the first axis of the lattice."""
     from matplotlib.colors import LogNorm
 
     values = spectrum.values

@@ -15,10 +15,10 @@ from phigen.spec.names import KEPT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Results other than observables that are drawn by default, in the order of preference.
+#: Results that are drawn if a sweep has no observables; the first that the store has is taken.
 _PREFERRED_RESULTS = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
-#: Ratio of the largest to the smallest value above which a scale is logarithmic.
+#: A scale is logarithmic if the ratio of the largest to the smallest value exceeds this number.
 _LOGARITHMIC_RATIO = 1e3
 
 #: Largest number of panels of a figure, and of panels in a row.
@@ -29,10 +29,10 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def draw(store: Path, path: Path, requested: str | None = None, origin: str = "") -> None:
-    """Draw the variable ``requested`` of a store into a file; by default all observables, or else the first of
-    `_PREFERRED_RESULTS`.
+    """Draw the variable ``requested`` of a store into a file.
 
-    The metadata of the file contain the text ``origin``. Raises `FileError` if the store has no such variable.
+    By default all observables are drawn, or else the first of `_PREFERRED_RESULTS` in the store. The metadata of the
+    file contain the text ``origin``. Raises `FileError` if the store has no such variable.
     """
     import xarray
 
@@ -59,7 +59,8 @@ def draw(store: Path, path: Path, requested: str | None = None, origin: str = ""
 def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[str]) -> Figure:
     """Return a figure with a panel for each variable; states have a panel for each coordinate.
 
-    ``varied`` has the names of the quantities that vary between members if their settings do not form a grid.
+    If the settings of the members do not form a grid, ``varied`` has the names of the quantities in which members
+    differ.
     """
     from matplotlib.figure import Figure
 
@@ -101,12 +102,13 @@ def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
-    """Draw values as curves or as a map; return a note on errors and further dimensions for the title.
+    """Draw values as curves or as a map; return a note for the title.
 
     Observables are drawn as curves over one dimension; a second dimension with few values gives several curves. If
-    there are draws of noise (dimension ``seed``), means over the draws are drawn with their standard errors. Other
-    variables over two dimensions, and observables with more curves, are drawn as maps. Over further dimensions the
-    median is taken.
+    members differ in their random numbers (dimension ``seed``), the means over these members are drawn with their
+    standard errors. Other variables over two dimensions, and observables that would need more curves, are drawn as
+    maps. If there are more dimensions, the median over them is drawn. The note says what the error bars are, and over
+    which dimensions means or medians were taken.
     """
     note = " ± standard error" if errors is not None else ""
     if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
@@ -150,7 +152,10 @@ def _curve(axes: Any, axis_dim: str, values: Any, errors: Any, colour: str, mark
 
 
 def _edges(values: Any, *, logarithmic: bool) -> Any:
-    """Return the edges of cells around coordinates: midpoints, or geometric means on a logarithmic axis."""
+    """Return the edges of the cells whose centres are ``values``.
+
+    The edges are midpoints, or geometric means on a logarithmic axis.
+    """
     positions = np.log(values) if logarithmic else values
     if len(positions) == 1:
         edges = positions[0] + np.array([-0.5, 0.5])
@@ -161,8 +166,10 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
 
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]) -> None:
-    """Draw members whose settings do not form a grid as points, over the first two quantities ``names`` in which
-    they differ."""
+    """Draw members as points, if their settings do not form a grid.
+
+    The axes are the first two of the quantities ``names`` in which the members differ.
+    """
     if len(names) < 2:
         axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
         axes.set(xlabel=names[0] if names else "member")
@@ -173,7 +180,10 @@ def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]
 
 
 def _colours(panel: Any) -> dict[str, Any]:
-    """Return colour map and scale as keyword arguments: logarithmic for positive values that span a wide range."""
+    """Return colour map and scale as keyword arguments.
+
+    The scale is logarithmic if the values are positive and span a wide range.
+    """
     from matplotlib.colors import LogNorm
 
     positive = _positive(panel)
@@ -181,7 +191,7 @@ def _colours(panel: Any) -> dict[str, Any]:
 
 
 def _positive(panel: Any) -> Any:
-    """Return the finite values other than 0 if they are all positive; else an empty array."""
+    """Return the values that are finite and not 0, if all of them are positive; else an empty array."""
     values = np.asarray(panel)
     finite = values[np.isfinite(values) & (values != 0)]
     return finite if finite.size and finite.min() > 0 else finite[:0]

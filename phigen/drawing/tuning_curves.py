@@ -1,4 +1,4 @@
-"""Plot of error over computing time for all candidates of a tuning."""
+"""Plot of error over computing time for all settings that a tuning has tried."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _MARKERS = "osD^vX"
 
 
 def draw_tuning(axes: Any, tuning: Tuning) -> None:
-    """Draw finalists and classical methods in colour, other candidates pale, and confirmed proposals as stars."""
+    """Draw a curve for each setting: the best settings in colour, classical methods dark, the others pale.
+
+    A star marks the step that is proposed for one of the best settings, or for a classical method.
+    """
     coloured = [f.curve for f in (*tuning.finalists, *tuning.peers)]
     pale = [c for c in tuning.curves if c not in coloured and c.points]
     for curve in pale:

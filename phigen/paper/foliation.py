@@ -61,7 +61,7 @@ def _draw(systems: list[System]) -> Figure:
 
 
 def _draw_spheres(axes: Any, system: System) -> None:
-    """Draw spheres as nets of lines, without the front octants, so that the inner spheres are visible."""
+    """Draw spheres as nets of lines. The quarter in front is left out, so that the inner spheres are visible."""
     casimir, names = system.casimirs["C"], system.coordinates
     box, gap = np.array([[-1.0] * 3, [1.0] * 3]), np.full((1, 3), np.nan)
     for level, colour in zip(SPHERES, SERIES, strict=False):
@@ -77,7 +77,7 @@ def _draw_paraboloids(axes: Any, system: System) -> None:
     """Draw the leaves x2 = x1 x3/C in the positive octant."""
     for level, colour in zip(PARABOLOIDS, SERIES, strict=False):
         first, share = np.meshgrid(np.linspace(0.02, 1, 8), np.linspace(0.02, 1, 8))
-        # The surface ends at x2 = 1.
+        # the drawn part of the surface ends at x2 = 1
         third = share * np.minimum(1.0, level / first)
         _draw_surface(axes, first, first * third / level, third, colour)
     axes.view_init(24, -40)

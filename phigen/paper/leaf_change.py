@@ -1,4 +1,6 @@
-"""Comparison of a Poisson map that changes symplectic leaves with one that is a Hamiltonian flow."""
+"""Comparison of two Poisson maps: a map in the paper, which changes the symplectic leaf, and the step of phigen, which
+does not.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, START = "poisson_not_hamiltonian", (1.0, 1.0, 2.0)
-#: K is the exponent k of the map, PAPER_STEP the step size in the paper. STEP is a larger step size, with which the
-#: change of the leaf is visible after TURNS periods of the orbit.
+#: K is the exponent k in `printed_map`. PAPER_STEP is the step size in the paper. STEP is a larger step size, with
+#: which the change of the leaf is visible after TURNS periods of the orbit.
 K, PAPER_STEP, STEP, TURNS = 2, 1e-4, 0.05, 3
 PERIOD, ELSEWHERE = 2 * math.pi, (1.0, 2.0, 4.0)
 
@@ -58,7 +60,7 @@ def _rows(state: Floats, h: float, steps: int, stride: int) -> Floats:
 
 
 def leaf_change_plate() -> Plate:
-    """Return the figure with both maps in space and with the value of the Casimir along them."""
+    """Return the figure of orbits under both maps in space, and of the value of the Casimir along them."""
     compilation, solver = compiled(SPEC, 4)
     steps = round(TURNS * PERIOD / STEP)
     trajectory = solver.integrate(START, STEP, steps)
@@ -94,7 +96,7 @@ def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -
 
 
 def _flow(state: Floats, t: float) -> Floats:
-    """Return the exact flow: the map without dilation."""
+    """Return the image of a state under the exact flow over the time t, which is `printed_map` without the dilation."""
     label = state @ (-1, 1, 1)
     image = printed_map(state, t)
     flow: Floats = image - label * (math.exp(t**K) - 1) / 2 * np.array([0.0, 1.0, 1.0])

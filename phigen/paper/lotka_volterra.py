@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: Labels of the curves: OWN with the orders of phigen's methods, CLASSICAL with the names of classical methods. PHI is
-#: the label of the method of the paper.
+#: Labels of the curves. OWN: for methods of phigen, with their orders. CLASSICAL: for classical methods, with their
+#: names in phigen. PHI is the label of the method of the paper.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"
 COLOURS = dict(zip([*OWN, *CLASSICAL], (SERIES[0], PALETTE["ink"], SERIES[1], SERIES[3]), strict=True))
-#: Time of the tabulated errors; step size and end time of the figure of the singularity.
+#: TIME: time of the tabulated errors. COARSE, END: step size and last time in the figure of the singularity.
 TIME, COARSE, END = 0.254, 1e-3, 0.262
 
 
 @dataclass(frozen=True)
 class Approach:
-    """Trajectories of all methods up to just before the singularity, by label, and the ``exact`` states (rows, DIM)."""
+    """Trajectories of all methods by label, up to just before the singularity, and the ``exact`` states (rows, DIM)."""
 
     compilation: Compilation
     solver: Solver
@@ -94,7 +94,7 @@ def errors_plate() -> Plate:
 
 
 def _order(course: Approach) -> float:
-    """Return the observed order of the method of the paper, at t = 0.2."""
+    """Return the order of the method of the paper, observed from errors at t = 0.2."""
     x0, errors = [float(v) for v in course.run.initial], []
     for steps in (200, 400):
         trajectory = course.solver.integrate(x0, 0.2 / steps, steps, steps)
@@ -151,8 +151,10 @@ def _left(course: Approach, t: float) -> float:
 
 
 def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tuple[Trajectory, float]:
-    """Return the trajectory up to the step at which the solver fails, if it does, and the time of the last
-    successful step."""
+    """Return the trajectory, and the time of its last step.
+
+    If the solver fails, the last step is the one before the failure.
+    """
     try:
         trajectory = solver.integrate(x0, h, steps)
     except StepError as error:

@@ -1,4 +1,4 @@
-"""Record of a redrawn figure of the paper, with measured numbers to compare with those of the paper."""
+"""Redrawn figure of the paper, with measured numbers to compare with those of the paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """Measured number with a paraphrase of the paper's statement about it."""
+    """Measured number, and what the paper says about it, in other words than those of the paper."""
 
     quantity: str
     paper: str
@@ -30,7 +30,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Plate:
-    """Figure with its title and its findings, the measured numbers."""
+    """Figure with its title and the numbers that were measured for it."""
 
     title: str
     figure: Figure
@@ -38,10 +38,10 @@ class Plate:
 
 
 def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[Compilation, Solver]:
-    """Return a system of the corpus, compiled at this order, and its C solver.
+    """Return a system of the corpus, compiled with the order ``order``, and its C solver.
 
-    ``birealisation`` names the kind, by default that of the spec. Raises `ToolchainError` without a C compiler: NumPy
-    would take too long for the runs of the paper.
+    ``birealisation`` names the kind of bi-realisation, by default that of the spec. Raises `ToolchainError` without a C
+    compiler: NumPy would take too long for the runs of the paper.
     """
     source = spec.load(resources.bundled_specs() / f"{name}.yaml")
     if birealisation:

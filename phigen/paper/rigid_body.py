@@ -25,14 +25,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: Number of steps of the long run; number of steps of the short runs, which give the first findings; number of rows
-#: that each run stores.
+#: LONG: number of steps of the long run. EARLY: number of steps of the short runs, from which the first numbers come.
+#: ROWS: number of rows that each run stores.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 #: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
-#: Step size of the Poincaré section, at which RK4 drifts visibly, and its number of steps.
+#: Step size and number of steps of the run for the Poincaré section. With this step size RK4 drifts visibly.
 COARSE, SECTION_STEPS = 0.004, 75_000
-#: Number of further steps after which RK4 has come to rest at an equilibrium; number of crossings that are drawn.
+#: _REST: number of further steps after which RK4 has come to rest at an equilibrium. _DOTS: number of crossings that
+#: are drawn.
 _REST, _DOTS = 10**6, 500
 
 
@@ -51,7 +52,7 @@ class Bodies:
 def bodies() -> Bodies:
     """Return the solvers of the figures, with their data.
 
-    They are the method PHI-2 of the paper, and order 4 with the bi-realisation that phigen chooses.
+    One solver is the method PHI-2 of the paper. The other has order 4 and the bi-realisation that phigen chooses.
     """
     compilation, solver = compiled(SPEC, 2, "cayley")
     run = compilation.spec.runs[RUN]
@@ -80,7 +81,7 @@ def errors_plate(steps: int = LONG) -> Plate:
 
 
 def _early_findings(body: Bodies) -> tuple[Finding, ...]:
-    """Return the findings from runs of `EARLY` steps."""
+    """Return the numbers that are measured in runs of `EARLY` steps."""
     stride = EARLY // ROWS
     poisson, double, better = (
         solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)

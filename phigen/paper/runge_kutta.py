@@ -1,4 +1,6 @@
-"""Runs of classical methods in compiled C that are advanced step by step, for long runs and for Poincaré sections."""
+"""Runs of classical methods in compiled C, which are advanced step by step: long runs, and runs for Poincaré
+sections.
+"""
 
 from __future__ import annotations
 
