@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a04cd27bf4493d46fd8bdaaae14a703cad923c5212b8b0f843556d46c19c48bc
+ * body-sha256: f246ea189a82e5b0ee555e5cd74de75c0c33af3a2c069eaa657086ef77152a61
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -38,7 +38,7 @@ typedef struct {
     double difference[duffing_DIFFERENCES][duffing_DIM]; /* the last solution, then its differences */
 } duffing_history;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[duffing_DIM];     /* the state; change it only by the functions below */
     double carry[duffing_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -74,7 +74,7 @@ duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 023de1f088022387099468c3d0144eeaf83f94359a3e749d6698f1b0ac1fc59f
+ * body-sha256: 5b211cf6114ebfeeff35b7c517eab67a284154e3e3ec757664034a8b3de2a96c
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -25,29 +25,29 @@ extern const food_web_params food_web_default_params;
 
 enum { food_web_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { food_web_COEFFICIENTS = 26 }; /* numbers that are functions of params and h */
-enum { food_web_GATHERED = 1 };      /* sums over other sites that are stored for each site */
+enum { food_web_GATHERED = 1 };      /* sums over bonds or pairs, stored for each site */
 enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
 
 /* A solver, initialised by food_web_init. Its arrays lie in memory of the caller, so a copy is no independent
-   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: copies
-   of the other end beside each end. Callers may only read the struct. */
+   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: beside
+   each end, copies of the sites at the opposite end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
+    size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[food_web_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[food_web_DIM]; /* fields before the present steps, restored if a step fails */
+    double *x[food_web_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    double *before[food_web_DIM]; /* copies of the fields, which replace them if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    int *bonds, *middle; /* for each site, index in other of the first bond that begins or ends there */
-    int *other, *number; /* for each bond of a site, the site at its other end, and its number */
+    int *bonds, *middle; /* indices in `other` of the first bond that starts, and ends, at each site */
+    int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
-    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
-    size_t far; /* number of the next steps that use full-range functions */
+    int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
+    size_t far; /* number of coming steps with functions for arguments of any size */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */
@@ -83,9 +83,9 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save and restore a run: it continues with the same bits. food_web_saved writes far and arrays
-   x[array][site], and returns their number: at most that of fields, or three times that with compensated
-   steps. To restore, call food_web_resume with these after food_web_init. */
+/* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *far, and arrays
+   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
+   compensated steps. To restore, call food_web_init, then food_web_resume with these values. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8429b9e7ee97dccd1e4ec7f2995790ece1e73de94b9d72c3b7902ea24a58a16
+ * body-sha256: 2f73bd6746907fdf4aa3a28f48f1e5027c0d206de79d85cfa1194130263b83a0
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -41,7 +41,7 @@ typedef struct {
     double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
 } guiding_centre_history;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[guiding_centre_DIM];     /* the state; change it only by the functions below */
     double carry[guiding_centre_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -75,7 +75,7 @@ guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const d
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

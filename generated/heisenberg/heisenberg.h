@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 59239c1b39cd08ca4615e3c6e0ae04f537615f61ea6d3448e1f5c85886aa47f2
+ * body-sha256: 5a97ef82e4e8df6c853633c99afb08406e10ba0d7f3193a74a1e542f63e3cd68
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -31,16 +31,16 @@ typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR
 
 /* A solver, initialised by heisenberg_init. Its arrays lie in memory of the caller, so a copy is no
    independent solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a
-   halo: copies of the other end beside each end. Callers may only read the struct. */
+   halo: beside each end, copies of the sites at the opposite end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
+    size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[heisenberg_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[heisenberg_DIM]; /* fields before the present steps, restored if a step fails */
+    double *x[heisenberg_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    double *before[heisenberg_DIM]; /* copies of the fields, which replace them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
-    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
-    size_t far; /* number of the next steps that use full-range functions */
+    int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
+    size_t far; /* number of coming steps with functions for arguments of any size */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */
@@ -80,9 +80,9 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
    then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
-/* Save and restore a run: it continues with the same bits. heisenberg_saved writes far and arrays
-   x[array][site], and returns their number: at most that of fields, or three times that with compensated
-   steps. To restore, call heisenberg_resume with these after heisenberg_init. */
+/* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *far, and
+   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
+   compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t far);

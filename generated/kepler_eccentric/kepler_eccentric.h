@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 06cb02a576b89dd9956cbe81f636ae62c93ee5e887efc43a1671f61c2c2b8077
+ * body-sha256: b286cb8ed650c4715a3657da01c44fde0c4c40d4e1e07b65a74746ee3e7aef11
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -34,7 +34,7 @@ typedef enum { kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_
     kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT } kepler_eccentric_status;
 const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* the meaning of a status */
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[kepler_eccentric_DIM];     /* the state; change it only by the functions below */
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -58,8 +58,8 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
-/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). All steps with the same e
-   follow one Hamiltonian. */
+/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). For fixed e, a step is an
+   exact Poisson map. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);
@@ -78,7 +78,7 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

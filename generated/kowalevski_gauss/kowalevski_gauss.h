@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4df95f2c96c5a6e9fdb088527a7948814e6882bf73dbfe9df90bc4f297e92b59
+ * body-sha256: 144b4e1e70b152efef773d2a9902ecaa0742cb1ebbd7c6e898b910f8429958a6
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -35,11 +35,11 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect
-   the speed only, except for a frame, which belongs to the state. */
+   the speed only. Unknowns are offsets from a state, their frame. */
 typedef struct {
     int count;     /* number of steps in increments */
     int latest;    /* index of the last step in increments */
-    int sweeps;    /* number of the first sweep over the stages whose change is measured */
+    int sweeps;    /* number of the first sweep whose change is measured */
     int predictor; /* row of kowalevski_gauss_prediction that predicts the next step */
     /* steps since the predictors were first compared; they are compared again after every
        kowalevski_gauss_TRIALS steps */
@@ -51,7 +51,7 @@ typedef struct {
     double increments[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[kowalevski_gauss_DIM]; /* the state; change it only by the functions below */
     double carry[kowalevski_gauss_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -93,7 +93,7 @@ kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solv
     size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 81340387a3785e7bbc78cb7fded2cfe50490dffd2a5ba0fbb85a391eb8470725
+ * body-sha256: b8220b20a06024d1efccfcb61aa80e80c6578a33d6b67c1ae9000318acb9d03f
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -30,7 +30,7 @@ typedef enum { pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_eu
     pendulum_euler_NOT_FINITE, pendulum_euler_BAD_ARGUMENT } pendulum_euler_status;
 const char *pendulum_euler_status_string(pendulum_euler_status status); /* the meaning of a status */
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[pendulum_euler_DIM]; /* the state; change it only by the functions below */
     double carry[pendulum_euler_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -61,7 +61,7 @@ pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const d
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a68a6353a3840f7514f930e14ad7413e44ab475f7c6e33270ec5da2c34c962e7
+ * body-sha256: c94f20df1689976493262c8e4066d749e2fcc2edb58e04bf47c3890c6620385d
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -27,7 +27,7 @@ enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that are functions of param
 enum { point_vortices_STAGES = 5 };       /* stages of a step */
 enum { point_vortices_DIRECTIONS = 24 };  /* dimension of a Krylov space */
 enum { point_vortices_DIFFERENCES = 2 };  /* differences in the predictor of a stage */
-enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are stored for each site */
+enum { point_vortices_GATHERED = 4 };     /* sums over bonds or pairs, stored for each site */
 
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
     point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
@@ -42,13 +42,13 @@ typedef struct {
 
 /* A solver, initialised by point_vortices_init. Its arrays lie in memory of the caller, so a copy is no
    independent solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a
-   halo: copies of the other end beside each end. Callers may only read the struct. */
+   halo: beside each end, copies of the sites at the opposite end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
+    size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[point_vortices_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[point_vortices_DIM]; /* fields before the present steps, restored if a step fails */
+    double *x[point_vortices_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    double *before[point_vortices_DIM]; /* copies of the fields, which replace them if a step fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];

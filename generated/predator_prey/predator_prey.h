@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cc42dd73886548e4b776bc3c4e733cf8d4fa290d66aea89cf0f019158f191b8c
+ * body-sha256: 0dd1037eafb945e63ed78a746f285ddb716af302cdaa1bb80d2248575491c631
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -41,7 +41,7 @@ typedef struct {
     double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
 } predator_prey_history;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[predator_prey_DIM]; /* the state; change it only by the functions below */
     double carry[predator_prey_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -73,7 +73,7 @@ predator_prey_status predator_prey_set_state(predator_prey_solver *s, const doub
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

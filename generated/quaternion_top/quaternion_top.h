@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 680c083f4df33e733e56fb37b221237a796b328ef6af19288cf1a6431aea1d6e
+ * body-sha256: cec14dd8b4af48c86048b6a2f195b4079f955f56357378861eaadf5ba298352a
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -15,7 +15,7 @@ extern "C" {
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
-enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs, multiples of which are subtracted from H: length */
+enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
 enum { quaternion_top_DIFFERENCES = 9 }; /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {
@@ -43,7 +43,7 @@ typedef struct {
     double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
 } quaternion_top_history;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[quaternion_top_DIM]; /* the state; change it only by the functions below */
     double carry[quaternion_top_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -52,7 +52,7 @@ typedef struct {
     double t; /* time since quaternion_top_init */
     double h; /* size of the last step; NaN before the first step */
     quaternion_top_params params; /* the parameters, set by quaternion_top_init; do not change them */
-    double gauge[quaternion_top_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */
+    double gauge[quaternion_top_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */
     double coef[quaternion_top_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
@@ -66,7 +66,7 @@ size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM]);
 
-/* As quaternion_top_init, with given factors of the Casimirs, whose multiples are subtracted from H. */
+/* As quaternion_top_init, with a given gauge: steps subtract gauge[k] times Casimir k from H. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES]);
 
@@ -80,7 +80,7 @@ quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const d
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1a5bd4833e4c135d7af029cb6a4b6f7e9fc5251bc9d9ca7e18d5d819616f4f2c
+ * body-sha256: 9aa90775b2c189a037e9ac2593729dbf20fd845659edb772ca0cdf320f965cf1
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -15,7 +15,7 @@ extern "C" {
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
 enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that are functions of params and h */
-enum { rigid_body_GAUGES = 1 };        /* number of Casimirs, multiples of which are subtracted from H: C */
+enum { rigid_body_GAUGES = 1 };        /* number of Casimirs whose multiples are subtracted from H: C */
 enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */
 enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
 enum { rigid_body_AHEAD = 8 };         /* number of solutions that the recurrence predicts */
@@ -67,7 +67,7 @@ typedef struct {
     size_t recurrences_from_step;     /* number of the step from which recurrences are tried again */
 } rigid_body_block_measurements;
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[rigid_body_DIM]; /* the state; change it only by the functions below */
     double carry[rigid_body_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -76,7 +76,7 @@ typedef struct {
     double t; /* time since rigid_body_init */
     double h; /* size of the last step; NaN before the first step */
     rigid_body_params params; /* the parameters, set by rigid_body_init; do not change them */
-    double gauge[rigid_body_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */
+    double gauge[rigid_body_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */
     double coef[rigid_body_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
@@ -91,7 +91,7 @@ size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM]);
 
-/* As rigid_body_init, with given factors of the Casimirs, whose multiples are subtracted from H. */
+/* As rigid_body_init, with a given gauge: steps subtract gauge[k] times Casimir k from H. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES]);
 
@@ -106,18 +106,18 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 
 /* Between steps: replace the parameters; the state is unchanged. Returns rigid_body_BAD_ARGUMENT, with *s
    unchanged, for parameters that rigid_body_init refuses. */
-/* The gauge is unchanged. */
+/* The gauge, the factors of Casimirs in s->gauge, is unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* rigid_body_ensemble for members with parameters params[m], step size h[m], and factors gauge[m *
-   rigid_body_GAUGES + k] of Casimirs. params may be NULL for the defaults, gauge for factors chosen at the
-   initial states. */
+/* rigid_body_ensemble for members with parameters params[m], step size h[m], and gauge: gauge[m *
+   rigid_body_GAUGES + k] is the factor by which Casimir k is subtracted from H. params may be NULL for the
+   defaults, gauge for factors chosen at the initial states. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
    members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

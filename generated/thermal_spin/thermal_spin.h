@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e1bc987e07d1180b77d8d15dc6d97c42dd2ee63576dc65507b992af053dc58b1
+ * body-sha256: 83819924e6cb1c44a48fecb17dd5675b4dbaff78e3184a630283b767e32c35c3
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -40,7 +40,7 @@ typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SI
     thermal_spin_NOT_FINITE, thermal_spin_BAD_ARGUMENT } thermal_spin_status;
 const char *thermal_spin_status_string(thermal_spin_status status); /* the meaning of a status */
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
     double x[thermal_spin_DIM]; /* the state; change it only by the functions below */
     double carry[thermal_spin_DIM]; /* rounding error of x: x + carry is more accurate */
@@ -65,8 +65,8 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     const double x0[thermal_spin_DIM]);
 
 /* Select the random numbers of the next steps. They are a function of seed, ensemble member and number of the
-   step, which is `step` for the next one; thermal_spin_init sets all three to 0. Each increment of the noise
-   is normal with variance |h|, truncated at thermal_spin_BOUND sqrt(|h|). */
+   step, which is `step` for the next step; thermal_spin_init sets seed, member and step to 0. Each increment
+   of the noise is normal with variance |h|, truncated at thermal_spin_BOUND sqrt(|h|). */
 thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
@@ -85,7 +85,7 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     const double *dw);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f5b45b20f9ed8ffadbd2da5b05583e8a97751a82ecf07814bff8780cad966fc9
+ * body-sha256: 5569525d039784416fa6568ac96bdf43a1528473bf90fe67b010bf2705411646
  */
 #ifndef TODA_H
 #define TODA_H
@@ -29,16 +29,16 @@ typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
 /* A solver, initialised by toda_init. Its arrays lie in memory of the caller, so a copy is no independent
-   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: copies
-   of the other end beside each end. Callers may only read the struct. */
+   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: beside
+   each end, copies of the sites at the opposite end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
-    size_t sites, rows; /* number of all sites, and of rows */
+    size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[toda_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[toda_DIM]; /* fields before the present steps, restored if a step fails */
-    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
-    size_t far; /* number of the next steps that use full-range functions */
+    double *x[toda_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    double *before[toda_DIM]; /* copies of the fields, which replace them if a step fails */
+    int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
+    size_t far; /* number of coming steps with functions for arguments of any size */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */
@@ -68,9 +68,9 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save and restore a run: it continues with the same bits. toda_saved writes far and arrays x[array][site],
-   and returns their number: at most that of fields, or three times that with compensated steps. To restore,
-   call toda_resume with these after toda_init. */
+/* Save a run, and restore it so that it continues with the same bits. toda_saved writes *far, and arrays
+   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
+   compensated steps. To restore, call toda_init, then toda_resume with these values. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far);
 

@@ -44,7 +44,7 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
     return Observables(
         kernel(Role.ENERGY, "energy", "the density of the Hamiltonian", [density]),
         kernel(Role.CASIMIRS, "casimirs", "the densities of the Casimirs", casimirs),
-        kernel(Role.VECTOR_FIELD, "vector_field", "pi grad H", field_with_sums(cell)),
+        kernel(Role.VECTOR_FIELD, "vector_field", "the vector field pi grad H", field_with_sums(cell)),
         numbers if densities else None,
         tuple(cell.reductions.values()),
         sites if fields else None,

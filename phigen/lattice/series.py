@@ -94,8 +94,8 @@ class SeriesPlan:
         since = [f"scheme: series, since {self.since}"] if self.since else []
         return [
             *since,
-            f"bi-realisation: {self.realisation.kind}, symmetric",
-            "generating function: S_1",
+            f"bi-realisation (alpha, beta): {self.realisation.kind}, symmetric; steps from alpha(y, p) to beta(y, p)",
+            "generating function S_h, p = grad S_h(y): S_1",
             step,
             *composed,
         ]
@@ -116,19 +116,37 @@ class SeriesPlan:
         size = len(self.middle)
         values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
         relax = site_kernel(
-            cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients, Role.RELAX
+            cell,
+            "relax",
+            "one fixed-point iteration for y at a site, from x at the site",
+            values[:size],
+            "y",
+            coefficients,
+            Role.RELAX,
         )
         purpose = "increment of x at a site by a stage, from y at the site and its neighbours"
         advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
         slopes = coefficients.hoist(along(cell, values[:size]))
         slope = site_kernel(
-            cell, "slope", "derivative of y at a site along a variation of y", slopes, "v", coefficients, Role.SLOPE
+            cell,
+            "slope",
+            "derivative of the iteration for y at a site along a variation of y",
+            slopes,
+            "v",
+            coefficients,
+            Role.SLOPE,
         )
         if not tangent:
             return Equation(relax, advance, slope)
         starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
         side = site_kernel(
-            cell, "side", "derivative of y at a site along a variation of x", starts, "v", coefficients, Role.SIDE
+            cell,
+            "side",
+            "derivative of the iteration for y at a site along a variation of x",
+            starts,
+            "v",
+            coefficients,
+            Role.SIDE,
         )
         purpose = "derivative of the increment of x at a site along a variation of y"
         follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)

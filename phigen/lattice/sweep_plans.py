@@ -123,14 +123,14 @@ class SplittingPlan:
         flows = (
             f"{len(choice.schedule().flows)} flows{further}"
             if not coloured_parts
-            else f"{', '.join(coloured_parts)} for each colour of sites"
+            else f"a flow of {' and of '.join(coloured_parts)} for each colour of sites"
         )
         monitor = [] if self.negative is None else [cell_monitor.fact(self.flows, self.negative)]
         relative = [f"coordinates of flows: {self.bodies.change.replace('_', ' ')}"] if self.bodies else []
         return [
             *monitor,
             *relative,
-            f"scheme: splitting, H = {parts}, with the exact flow of each",
+            f"scheme: splitting, H = {parts}, with the exact flow of each part",
             f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{reason}",
             "step: explicit",
         ]

@@ -199,14 +199,15 @@ def _facts(
     """Yield the lines on the method for the header of generated files; some may be empty."""
     generating = scheme.generating
     series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
-    terms = f", {generating.terms} terms" if generating.terms else ""
-    yield f"bi-realisation: {realisation.kind}, {'symmetric' if realisation.symmetric else 'not symmetric'}"
+    terms = f", {generating.terms} term{'s' * (generating.terms > 1)}" if generating.terms else ""
+    symmetry = "symmetric" if realisation.symmetric else "not symmetric"
+    yield f"bi-realisation (alpha, beta): {realisation.kind}, {symmetry}; steps from alpha(y, p) to beta(y, p)"
     yield from approximation(realisation)
-    yield f"generating function: {series} ({generating.form}{terms})"
+    yield f"generating function S_h, p = grad S_h(y): {series} ({generating.form}{terms})"
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
     g = "g " * bool(gauge.monitor)
-    halves = f", impulse h {g}f by halves before and after" if system.forces and acts(system.forces.vector) else ""
+    halves = f", impulses h {g}f/2 before and after" if system.forces and acts(system.forces.vector) else ""
     yield from force_facts(system, f"p = h {g}(grad H + zeta){halves}")
     yield from noise_facts(system, weak=1)
     yield f"step: {step.kind.manner}"

@@ -75,9 +75,11 @@ class Gauge:
     @property
     def facts(self) -> list[str]:
         """The lines about the gauge in the header of generated files."""
-        lines = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
-        terms = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
-        return (lines if self.free else []) + ([f"gauge: {self.letter} - {terms}"] if terms else []) + self.notes
+        names = f"{'multiples' if len(self.free) > 1 else 'a multiple'} of {', '.join(self.free)}"
+        lines = [f"gauge: {self.letter} minus {names}, chosen at the start of each trajectory"]
+        terms = " - ".join(f"({value}) {name}" for name, value in self.fixed.items())
+        fixed = [f"gauge: {self.letter} - {terms} in place of {self.letter}"] if terms else []
+        return (lines if self.free else []) + fixed + self.notes
 
     @property
     def notes(self) -> list[str]:
@@ -283,7 +285,7 @@ def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
         products += [total(a * b for a, b in zip(h, c, strict=True)), total(b * b for b in c)]
     guide = Kernel(
         "guide",
-        "the leading error vector pi grad S_3, as a function of the gauge",
+        "the leading error vector pi grad S_3, as a function of the gauge (factors of Casimirs)",
         {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates},
         (Output("error", hamiltonian_vector_field(system.poisson, slope)),),
     )

@@ -265,12 +265,12 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
         yield "structure: to truncation; a step is not a Poisson map, and conserves Casimirs of degree 1 and 2 only"
     elif realisation.groups:
         group_names = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
-        yield f"structure: exact; quadratic momentum maps for {group_names}"
+        yield f"structure: exact, a step is a Poisson map; quadratic momentum maps for {group_names}"
     elif realisation.logarithms:
         group_names = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
-        yield f"structure: exact, as brackets are constant with the logarithms of {group_names}"
+        yield f"structure: exact, a step is a Poisson map; brackets are constant with the logarithms of {group_names}"
     else:
-        yield "structure: exact, as the brackets are constant"
+        yield "structure: exact, a step is a Poisson map, since the brackets are constant"
     yield from gauge.facts
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from force_facts(system, "pi(grad H + zeta) + f at the stages")

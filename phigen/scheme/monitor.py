@@ -57,9 +57,9 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
     """Yield the line about the monitor in the header of generated files; nothing without a monitor."""
     if monitor and forced:
-        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; e has no part in them"
+        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau, and do not depend on e"
     elif monitor:
-        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; the step is that of K = g (H + e)"
+        yield f"monitor: dt = g dtau with g = {monitor}; steps equal in tau, of K = g (H + e), e = -H(x0)"
 
 
 def monitor_of(spec: Spec) -> Expression | None:

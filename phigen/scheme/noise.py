@@ -40,7 +40,7 @@ def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
         return
     names = ", ".join(sources)
     yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it conserves all Casimirs"
-    yield f"each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order {weak}"
+    yield f"noise: strong order 1 if its sources commute, else 1/2; weak order {weak}"
 
 
 def noise_flows(system: System) -> tuple[Flow, ...]:

@@ -54,7 +54,7 @@ class MeasurePolicy(Policy):
     ``floor`` is 0 if the coordinates keep their signs, since these coordinates may differ much in size.
     """
 
-    floor: float = number(1e-6, "components of y count as at least this share of the largest")
+    floor: float = number(1e-6, "a correction is relative to |y_i| + this fraction of the largest |y_j|")
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class NewtonPolicy(Policy):
     """Newton's method for the implicit equation of a step; its tolerance is in `InnerSolve`."""
 
     nearly_solved: float = number(1e-8, "a correction below this may be rounding")
-    shrinking: float = number(0.25, "ratio of successive corrections below NEARLY_SOLVED that shows rounding")
+    shrinking: float = number(0.25, "corrections below NEARLY_SOLVED are rounding if their ratio exceeds this")
 
 
 @dataclass(frozen=True)
@@ -76,20 +76,22 @@ class PathPolicy(Policy):
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")
     most_pieces: int = count(
         512,
-        "largest number of pieces of all paths in the solution for p; with more, errors are as large as x",
+        "largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state",
     )
     patience: int = count(3, "iterations before it is checked whether the approximate Jacobian is good enough")
     negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
-    least_share: float = number(1e-5, "coordinates count as at least this fraction of the sum of all coordinates")
-    rounded_slope: float = number(2e-15, "accepted error of the slope of a path, relative to the path and its slope")
+    least_share: float = number(
+        1e-5, "terms in coordinate i are relative to its size + this fraction of the sum of all |x_j|"
+    )
+    rounded_slope: float = number(2e-15, "rounding of the slope of a path, relative to the path and its slope")
     difference: float = number(
-        1e-7, "increment of p in a difference quotient, relative to p: about the square root of a rounding error"
+        1e-7, "difference of arguments in a difference quotient, relative to p: the square root of rounding"
     )
     solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
     nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
-    shrinking: float = number(0.25, "ratio of successive residuals below NEARLY_SOLVED that shows rounding")
+    shrinking: float = number(0.25, "residuals below NEARLY_SOLVED are rounding if their ratio exceeds this")
     contracting: float = number(
-        0.05, "largest ratio of successive residuals with which the approximate Jacobian is good enough"
+        0.05, "a Jacobian is useful if an iteration reduces the residual to less than this fraction"
     )
 
 
@@ -98,18 +100,16 @@ class GaussPolicy(Policy):
     """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
     compared."""
 
-    most_rising: int = count(3, "a step fails after this number of growing changes in a row, plus one for each stage")
+    most_rising: int = count(3, "a step fails if (number of stages + this) changes in a row have grown")
     solved: float = number(
-        2e-18, "sweeps end at an expected next change below this; with 2e-17 energy and Casimirs drifted"
+        2e-18, "largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly"
     )
     stalled: float = number(
-        0.8, "ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted"
+        0.8, "above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted"
     )
-    rounding: float = number(
-        4e-16, "sweeps end at a change below this if its ratio to the change before is at least STALLED"
-    )
+    rounding: float = number(4e-16, "below this, sweeps end when a change exceeds STALLED times the last one")
     nearly_rounding: float = number(
-        2e-14, "sweeps end at the second change below this that is no smaller than the change before"
+        2e-14, "below this, sweeps end when a change is not smaller than the last one for the second time"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -119,10 +119,8 @@ class PredictorPolicy(Policy):
     """Starting values for the iteration of an implicit step, extrapolated from earlier steps by backward
     differences."""
 
-    reach: float = number(4.0, "largest relative distance of a prediction from the last value")
-    differences: int = count(
-        9, "number of stored differences; differences of higher order would amplify rounding errors"
-    )
+    reach: float = number(4.0, "largest relative distance of a prediction from the last solution")
+    differences: int = count(9, "number of stored differences; higher ones would amplify rounding errors")
 
 
 @dataclass(frozen=True)
@@ -131,24 +129,27 @@ class PlausibilityPolicy(Policy):
     energy.
     """
 
-    plausible: float = number(1.5, "relative length of steps above which the energy is checked")
-    max_energy_change: float = number(0.5, "accepted relative change of energy if it is checked")
+    plausible: float = number(1.5, "longest accepted step, relative to |x| + |h dx/dt|")
+    max_energy_change: float = number(0.5, "largest relative change of energy in accepted longer steps")
 
 
 @dataclass(frozen=True)
 class GaugeSearch(Policy):
     """The search for the multiples of Casimirs whose subtraction from H minimises the leading error of a step."""
 
-    samples: int = count(32, "number of states along a short piece of the trajectory")
-    degree: int = count(6, "S_3 is cubic in H, so the square of the error is of degree six in each multiple")
-    sweeps: int = count(4, "largest number of rounds over all multiples")
-    grids: int = count(3, "number of grids on a line, each finer than the grid before by the factor MESH")
-    first_reach: int = count(24, "number of points of the first grid on each side of its centre")
-    reach_of_grid: int = count(8, "number of points of each finer grid on each side of its centre")
-    mesh: float = number(0.125, "mesh of the first grid, in units of the width of the search")
-    sample_length: float = number(0.25, "distance of successive states, relative to the first state")
+    samples: int = count(32, "number of sample states along a short piece of the trajectory")
+    degree: int = count(6, "degree of the squared error in the factor of a Casimir, since S_3 is cubic in H")
+    sweeps: int = count(4, "largest number of rounds; a round optimises each factor once")
+    grids: int = count(
+        3, "number of grids in the search for a factor; each is finer by the factor MESH than the last one"
+    )
+    first_reach: int = count(24, "points of the first grid on each side of its centre")
+    reach_of_grid: int = count(8, "points of later grids on each side of the best point so far")
+    mesh: float = number(0.125, "distance of the points of the first grid, in units of the width |grad H|/|grad C|")
+    sample_length: float = number(0.25, "distance between successive sample states, relative to the size of the first")
     close_call: float = number(
-        1e-12, "errors with a smaller difference, relative to the sum of all errors on a line, count as equal"
+        1e-12,
+        "errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide",
     )
 
 
@@ -169,7 +170,7 @@ class GaussTangentPolicy(Policy):
     tangent_solved: float = number(1e-17, "a relative change below this is rounding")
     tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
     tangent_shrinking: float = number(
-        0.4, "ratio of successive residuals below TANGENT_NEARLY_SOLVED that shows rounding"
+        0.4, "residuals below TANGENT_NEARLY_SOLVED are rounding if their ratio exceeds this"
     )
 
 
@@ -177,12 +178,10 @@ class GaussTangentPolicy(Policy):
 class GaussAdjointPolicy(Policy):
     """Sweeps that solve the transposed linear equations of the stages of a Gauss step, for gradients."""
 
-    adjoint_solved: float = number(
-        1e-17, "sweeps end at an expected next change below this, relative to the cotangents"
-    )
-    adjoint_stalled: float = number(0.8, "ratio of successive changes from which on sweeps do not help")
+    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
+    adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "sweeps end at the second change below this with a ratio above ADJOINT_STALLED"
+        1e-12, "below this, sweeps end when a change exceeds ADJOINT_STALLED times the last one for the second time"
     )
 
 
@@ -214,7 +213,7 @@ class LatticeNewtonPolicy(Policy):
     """Newton's method for a stage on a lattice whose sweeps converge slowly; Krylov methods solve its linear
     equations."""
 
-    directions: int = count(24, "dimension of the Krylov space of a correction")
+    directions: int = count(24, "dimension of the Krylov space in which a correction is computed")
     solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(
@@ -226,7 +225,7 @@ class LatticeNewtonPolicy(Policy):
 class LatticeTangentPolicy(Policy):
     """The linear equation for a tangent vector of a step of a lattice, solved by iterative corrections."""
 
-    carried: float = number(2.0**-54, "a relative residual of a tangent vector below this is rounding")
+    carried: float = number(2.0**-54, "the residual of a tangent vector is rounding below this fraction of the vector")
     nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is rounding too")
     carried_shrinking: float = number(0.5, "a residual shrinks if below this fraction of the one before")
 

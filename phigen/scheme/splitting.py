@@ -164,7 +164,7 @@ def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[st
     parts, forces = (" + ".join(n for n, force in names if bool(force) == acting) for acting in (False, True))
     reason = f", since {choice.why}" if choice.why else ""
     return [
-        f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each",
+        f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each part",
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{further}{reason}",
         f"step: {step.kind.manner}",
     ]

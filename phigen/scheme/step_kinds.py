@@ -43,8 +43,8 @@ NEWTON = StepKind(
 EXPLICIT = StepKind("explicit", "a formula", "explicit")
 PATH = StepKind(
     "path",
-    "paths, each followed by its Taylor series",
-    "implicit in p, each path followed by its Taylor series to round-off",
+    "paths, computed by their Taylor series",
+    "implicit in p; paths dm/dt = pi(m) p by Taylor series to round-off",
     unit="evaluation of the equation for p",
     implicit=True,
     predicted=True,

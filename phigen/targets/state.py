@@ -107,7 +107,7 @@ STATE = (
     StateBlock(
         "gauge",
         "GAUGE && !MONITOR",
-        ("double gauge[PHI_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */",),
+        ("double gauge[PHI_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */",),
     ),
     StateBlock("common", "COMMON", ("PHI_COMMON_MEMBER",)),
     StateBlock(

@@ -172,7 +172,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     )
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
-        held = f"number of Casimirs, multiples of which are subtracted from H: {', '.join(program.held)}"
+        held = f"number of Casimirs whose multiples are subtracted from H: {', '.join(program.held)}"
         sizes.append(("GAUGES", len(program.held), "the energy level e" if program.monitor else held))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:

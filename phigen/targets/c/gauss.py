@@ -59,7 +59,11 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
 def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
     """Return the sizes of a Gauss step other than the number of stages: name, value and comment."""
     return [
-        ("PLAIN", step.plain, "first unknowns, with the scale of x: coordinates, time, functionals"),
+        (
+            "PLAIN",
+            step.plain,
+            "the first unknowns, whose changes are relative to |x|",
+        ),
         (
             "POINT",
             program.dimension + bool(program.time) + (step.lift.size if step.lift else 0),

@@ -11,7 +11,7 @@ LATTICE = (
         "sizes",
         members=(
             "size_t sizes[PHI_AXES];   /* number of sites along each axis */",
-            "size_t sites, rows;       /* number of all sites, and of rows */",
+            "size_t sites, rows;       /* number of sites, and of rows */",
             "ptrdiff_t length, width;  /* sites of a row; doubles from the start of a row to that of the next */",
         ),
     ),
@@ -27,12 +27,12 @@ LATTICE = (
     ),
     StateBlock(
         "x",
-        members=("double *x[PHI_ARRAYS]; /* first sites of the fields, then parameters at sites */",),
+        members=("double *x[PHI_ARRAYS]; /* fields, then parameters at sites, each from its first site */",),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(
         "before",
-        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if a step fails */",),
+        members=("double *before[PHI_DIM]; /* copies of the fields, which replace them if a step fails */",),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(
@@ -75,8 +75,8 @@ LATTICE = (
         "bonds",
         "GRAPH",
         (
-            "int *bonds, *middle;      /* for each site, index in other of the first bond that begins or ends there */",
-            "int *other, *number; /* for each bond of a site, the site at its other end, and its number */",
+            "int *bonds, *middle;      /* indices in `other` of the first bond that starts, and ends, at each site */",
+            "int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */",
         ),
     ),
     StateBlock(
@@ -112,8 +112,8 @@ LATTICE = (
         "open",
         "!SERIES",
         (
-            "int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */",
-            "size_t far; /* number of the next steps that use full-range functions */",
+            "int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */",
+            "size_t far; /* number of coming steps with functions for arguments of any size */",
         ),
     ),
     StateBlock(

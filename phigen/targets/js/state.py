@@ -68,7 +68,7 @@ SOLVER = (
             "tCarry = 0;",
         ),
         ("tCarry",),
-        (Option("gauge", "ArrayLike<number>", "energy level e: steps with one e follow one Hamiltonian"),),
+        (Option("gauge", "ArrayLike<number>", "energy level e: for fixed e, a step is an exact Poisson map"),),
     ),
     StateFields(
         "TIMED",

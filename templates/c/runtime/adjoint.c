@@ -18,7 +18,8 @@ static void phi_rewind(phi_solver *s)
     phi_renew(s);
 }
 
-/* If the state after done steps is an output row, add the derivatives of L by this row to the cotangent of the state. */
+/* If the state after `done` steps is an output row, add the derivatives of L by this row to the cotangent of the state.
+   */
 static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, size_t steps, size_t stride)
 {
     if (done != steps && done % stride != 0) return;

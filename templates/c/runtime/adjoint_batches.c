@@ -29,7 +29,7 @@ static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double m
 #include "adjoint_join_groups.c"
 #include "adjoint_join_batches.c"
 
-/* If the states after done steps are an output row, write the states of the members to it. */
+/* If the states after `done` steps are an output row, write the states of the members to it. */
 static void phi_pull_rows(const phi_group *group, int count, const phi_pulled *all, size_t first, size_t done)
 {
     const size_t row = (done + all->stride - 1) / all->stride - 1;

@@ -27,8 +27,8 @@ static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_l
 #endif
 }
 
-/* Add to the cotangents of the start of the step and of the coefficients what they get from the stage increments, whose
-   cotangents are given. */
+/* From given cotangents of the stage increments, compute what they contribute to the cotangents of the start of the
+   step and of the coefficients, and add it. */
 static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *increments_bar, phi_cotangent *bar)
 {
@@ -102,8 +102,8 @@ static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const dou
 }
 
 #endif
-/* Compute starting values for the cotangents of the stage increments from the cotangents of the unknowns in the next step,
-   by the predictor of steps with the stages in reverse order. */
+/* Compute starting values for the cotangents of the stage increments, from the cotangents of the unknowns in the next
+   step. The predictor of steps serves with the stages in reverse order. */
 static void phi_predict_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS],
     const double end_bar[PHI_UNKNOWNS], const phi_cotangent *bar, phi_lanes *increments_bar)
 {

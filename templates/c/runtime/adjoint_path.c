@@ -8,7 +8,7 @@
 
 #define PHI_BACK_NEGLIGIBLE 1e-18    /* terms of a series below this are negligible, relative to start and sum */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* accepted error of the slope of a series, relative to the path and its slope */
-#define PHI_ANCHORED 8               /* largest number of corrections of the end of a path, so that its mean is the solution y */
+#define PHI_ANCHORED 8               /* largest number of corrections of the end of a path, after which its mean is the solution y */
 #define PHI_ANCHORED_TO 1e-15        /* accuracy of the mean after these corrections, relative to the state */
 
 /* Sum the magnitudes of each group of quantities of a path that is integrated backward: of the state, of its cotangent, of
@@ -69,9 +69,9 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
     return 0;
 }
 
-/* Integrate a path backward from its end, to compute the cotangents of its start, of p and of the coefficients from those,
-   bar of its end and mean_bar of its mean. cotangents receives the start, then these cotangents. Returns 0 if the path
-   cannot be followed. */
+/* Integrate a path backward from its end, to compute cotangents of its start, of p and of the coefficients. Given are
+   bar, the cotangents of its end, and mean_bar, those of its mean. The result cotangents has the start of the path,
+   then these cotangents. Returns 0 if the path cannot be followed. */
 static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
     const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double cotangents[PHI_BACK])
 {

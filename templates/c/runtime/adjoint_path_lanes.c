@@ -4,7 +4,7 @@
 #include <string.h>
 #include "adjoint_lanes.c"
 
-#define PHI_BACK_SETTLED 1e-15  /* relative accuracy of the middles of paths, m at half time */
+#define PHI_BACK_SETTLED 1e-15  /* relative accuracy of the middle of a path, m at half time */
 #define PHI_BACK_ACCURACY 1e-17 /* relative accuracy of the derivatives of paths */
 
 #if PHI_ALONG
@@ -36,8 +36,8 @@ static void phi_vary_coefficients(phi_expansion *e)
 }
 
 #endif
-/* Compute the derivatives of the starts and changes of the paths by their middles and by p, from the sums of the even and
-   of the odd terms of their series. */
+/* Compute the derivatives of the starts and of the changes of the paths, by their middles and by p. They follow from
+   the sums of the even and of the odd terms of the series. */
 static void phi_ends_of_slopes(phi_expansion *e)
 {
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {

@@ -5,8 +5,8 @@
 
 #include "adjoint_segments.c"
 
-/* The states before flows are recomputed by the inverse flows, each over -h. Each segment restarts from a stored state,
-   so rounding errors do not accumulate over segments. */
+/* The state before each flow is recomputed by the inverse flow, the flow over the negative time. Each segment restarts
+   from a stored state, so rounding errors do not accumulate over segments. */
 #define PHI_UNLIKE 1e-13 /* largest accepted difference from the stored state at the start of a segment, relative to the state */
 
 /* Restore the stored state at the start of a segment, after all its steps have been recomputed by the inverse flows. If

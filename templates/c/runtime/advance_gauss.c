@@ -7,7 +7,7 @@
 static inline int phi_advance(phi_solver *s, const double *change, const double *small)
 {
     double x[PHI_DIM], carry[PHI_DIM], zero = 0.0; /* x - x is 0 if x is finite, else NaN */
-    for (int i = 0; i < PHI_DIM; ++i) { /* x needs two additions; the next step does not wait for the others */
+    for (int i = 0; i < PHI_DIM; ++i) { /* the next step needs x only, so x is computed by two additions and does not wait for the carry */
         const double total = change[i] + small[i], more = total - change[i];
         const double sum = s->x[i] + total, added = sum - s->x[i];
         x[i] = sum;

@@ -14,7 +14,7 @@
 /* Multiply s->turned, the group element of the attitude, by 1 + factor, the attitude increment of a step or stage, in
    compensated arithmetic. */
 #if PHI_RATE_OF_GAUGE
-/* Then multiply it from the other side by 1 + aside, the gauge rotation in the time of the step; NULL for none. */
+/* Then multiply it from the opposite side by 1 + aside, the gauge rotation in the time of the step; NULL for none. */
 #endif
 static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND_DOUBLE_ASIDE)
 {

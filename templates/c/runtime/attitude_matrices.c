@@ -33,7 +33,7 @@ static int phi_doublings(double square)
     return doublings;
 }
 
-/* Compute exp(P) - 1 for the matrix P that the numbers p define: exp(P/2^k) is squared k times. Each squaring doubles
+/* Compute exp(P) - 1, where the numbers p define the matrix P: exp(P/2^k) is squared k times. Each squaring doubles
    rounding errors, so orthogonal matrices are made orthogonal again after it. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {

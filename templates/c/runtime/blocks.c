@@ -107,8 +107,8 @@ static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, doub
 #include "blocks_adams.c"
 #include "blocks_prediction.c"
 
-/* Predict the solutions of all stages of the steps of a block, by recurrences or else by approximate integration. Returns
-   0 if a prediction is not near the state. */
+/* Predict the solutions of all stages of all steps of a block: by recurrences if they are in use, else by approximate
+   integration. Returns 0 if a prediction is not near the state. */
 static int phi_predict_block(phi_solver *s, phi_table *table, phi_model *model)
 {
     if (!s->blocks.use_recurrences) phi_predict_by_march(s, table, model);

@@ -6,13 +6,13 @@
 
 enum {
     PHI_STRIDES = 2, /* Runge-Kutta steps in place of one step */
-    PHI_MEETINGS = 2 /* iterations of a stage until its point y nearly satisfies alpha(y) = x; the first stage takes one more */
+    PHI_MEETINGS = 2 /* iterations of a stage after which its point y nearly satisfies alpha(y) = x; the first stage takes one more */
 };
 
 #define PHI_ASTRAY 1e-3 /* largest accepted difference of predicted and corrected x, relative to |x| + |increment|; measured */
-#define PHI_FADING 0.4  /* factor per stage by which earlier stages count less in the fit of the prediction error; measured */
+#define PHI_FADING 0.4  /* factor by which a stage counts less than the next one in the fit of the prediction error; measured */
 
-/* Note that the next steps do not continue a block, so the next block computes all slopes anew. */
+/* Record that the next steps do not continue a block, so that the next block computes all slopes anew. */
 static void phi_end_march(phi_table *table) { table->marching = 0; }
 
 /* Integrate x from the time t over the time h, by PHI_STRIDES Runge-Kutta steps. */
@@ -32,9 +32,9 @@ static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES
     for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
 }
 
-/* Make a step of Adams' method of order 9 from x, with a prediction of order 8. Slope number `done` is that at x; this and
-   the slopes before must be known, and the slope at the prediction is stored as the next. Returns 0, with x unchanged, if
-   prediction and result differ much, since the step is then too long for the method. */
+/* Make a step of Adams' method of order 9 from x, with a prediction of order 8. Slope number `done`, at x, and the
+   slopes before it must be known. The slope at the prediction is stored as the next one. If prediction and result
+   differ much, the step is too long for the method: then x is unchanged, and the function returns 0. */
 static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
 {
     static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
@@ -62,7 +62,8 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
     return 1;
 }
 
-/* Compute the slopes at the starts of the last PHI_PAST steps, as if they had the present size, by integrating backward. */
+/* Compute the slopes at the starts of PHI_PAST earlier steps of the present size, by integrating backward from the
+   present state. */
 static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
 {
     double x[PHI_DIM];
@@ -130,9 +131,9 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
 }
 
 /* Predict the solutions of a block without recurrences. The states at the starts of all steps are predicted first; then
-   each lane iterates the stages of its step. The starting value of y in a stage is its start plus half the exact increment.
-   Its error is of third order in the size of the stage if y is the mean of its ends, else of second order, with a factor
-   that is fitted to the earlier stages of the step. */
+   each lane iterates the stages of its step. The starting value of y in a stage is the start of the stage plus half the
+   exact increment. If y is the mean of the ends of a stage, the error of this value is of third order in the size of
+   the stage, else of second order. Its factor is fitted to the earlier stages of the step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM], predicted[PHI_DIM], missed[PHI_DIM];

@@ -4,7 +4,8 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Replace each y by the point at which (alpha + beta)/2 equals that y, to leading order in the step size. */
+/* model->y has the means of start and end of steps. Replace each by the point y at which (alpha + beta)/2 is this mean,
+   to leading order in the step size. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -15,8 +16,9 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
     }
 }
 
-/* Predict the solutions of a block without recurrences: by points at which (alpha + beta)/2 is, to leading order, the mean
-   of start and end of a classical Runge-Kutta step. */
+/* Predict the solutions of a block without recurrences. The steps are first made by the classical Runge-Kutta method.
+   Then the predictions are the points at which (alpha + beta)/2 is the mean of start and end of these steps, to leading
+   order. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];

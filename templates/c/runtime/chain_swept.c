@@ -4,8 +4,8 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Compute for the step in each lane the matrix that maps the residual of its first stage to its contribution to the
-   residual of the first stage of the next step: the product of 1 + gain over the stages. */
+/* Compute, for the step in each lane, the product of 1 + gain over its stages. This matrix maps the residual of the
+   first stage to its contribution to the residual of the first stage of the next step. */
 static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
 {
     memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);

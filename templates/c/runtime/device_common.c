@@ -3,8 +3,8 @@
 #include "device_solver.c"
 
 /* ---- The kernel of coefficients ---- */
-/* One work item computes the coefficients of steps of size h[0] with the parameters params[0]. Members that all have these
-   may share the coefficients: see PHI_COMMON. */
+/* One work item computes the coefficients of steps of size h[0] with the parameters params[0]. Members that all have
+   this step size and these parameters may share the coefficients: see PHI_COMMON. */
 PHI_KERNEL void phi_coefficients_kernel(PHI_GLOBAL const phi_params *params, PHI_GAUGE_ARGUMENT PHI_GLOBAL const double *h,
     PHI_GLOBAL phi_coefficients *coefficients)
 {

@@ -13,8 +13,8 @@
 #if PHI_TIMED
 /* The initial time of member m is t0[m] if start_per_member is 1, and t0[0] if it is 0. */
 #elif PHI_GAUGE
-/* gauge has PHI_GAUGES numbers for each member if start_per_member is 1, and for all members together if it is 0. NULL for
-   gauges chosen at the initial states. */
+/* gauge has PHI_GAUGES numbers for each member if start_per_member is 1, and PHI_GAUGES numbers that hold for all
+   members if it is 0. If gauge is NULL, gauges are chosen at the initial states. */
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */

@@ -4,7 +4,7 @@
    extrapolated. It affects the speed only. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
-    PHI_SHARED double *difference; /* in shared memory: the last solution, then its differences, each of PHI_DIM numbers */
+    PHI_SHARED double *difference; /* in shared memory: the last solution, then its differences; PHI_DIM numbers each */
 } phi_history;
 
 /* Number of doubles in shared memory for the predictors of one work item. */

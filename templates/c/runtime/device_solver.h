@@ -15,7 +15,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 /* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
-/* As phi_init, with the numbers that PHI_GAUGES counts; phi_init chooses them at x0. */
+/* As phi_init, but the caller chooses the PHI_GAUGES numbers in gauge; phi_init chooses them at x0. */
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
@@ -26,7 +26,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
    increments. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
-/* Select the random numbers of the next steps. They are a function of seed, member and the number of the step, which is
-   `step` for the next one; phi_init sets all three to 0. */
+/* Select the random numbers of the next steps. They are a function of seed, member and number of the step, which is
+   `step` for the next step; phi_init sets seed, member and step to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 #endif

@@ -2,7 +2,7 @@
 #define PHI_FILE_ELAPSED
 #include "solver.h"
 
-/* Add the physical time of a stage to the time of a step. */
+/* Add the physical time of a stage to the time of the solver, in compensated arithmetic. */
 static void phi_pass(phi_solver *s, double elapsed)
 {
     const double sum = s->t + elapsed, added = sum - s->t;

@@ -16,12 +16,12 @@ enum {
     PHI_ROUNDS = 12          /* largest number of iterations for the middle, each of which gains some digits */
 };
 
-#define PHI_GAIN_OF_ROUND 1e-4 /* terms are added until they are smaller than the error of the middle by this factor */
+#define PHI_GAIN_OF_ROUND 1e-4 /* terms are added until they are smaller than this fraction of the error of the middle */
 
-/* The path dm/dt = pi(m) p in each lane, as Taylor series about its middle. With half of p, its time goes from -1 to 1, and
-   fewer terms are needed than from its start. s[i][k] is coefficient k of series i, and the coordinates are the first
-   series. slope has the series of the entries of d(pi p)/dm and of pi; they give v, the derivatives of the path by its
-   middle and p, row by row. */
+/* The path dm/dt = pi(m) p in each lane, as Taylor series about its middle: with p/2 in place of p, time goes from -1
+   to 1, and fewer terms are needed than from the start. s[i][k] is coefficient k of series i, and the coordinates are
+   the first series. slope has the series of the entries of d(pi p)/dm and of pi. They give v, the derivatives of the
+   path by its middle and by p, row by row. */
 typedef struct {
     phi_lanes p[PHI_DIM], fixed[PHI_FIXED], slope_fixed[PHI_SLOPE_FIXED], value[PHI_SERIES];
     phi_lanes s[PHI_SERIES][PHI_TERMS_OF_LANES + 1], slope[PHI_SLOPE_SERIES][PHI_SLOPE_TERMS + 1];
@@ -219,8 +219,8 @@ static void phi_vary_order(phi_expansion *e, int k)
     for (int j = 0; j < k; ++j) phi_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. size receives their
-   magnitudes: of the derivatives by the middle as they are, of those by p relative to their terms of order 1. */
+/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. size receives the
+   magnitudes of these terms; for derivatives by p, they are relative to the terms of order 1. */
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {
     phi_lanes parts[2] = { { 0.0 } }, first = { 0.0 };

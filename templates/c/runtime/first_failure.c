@@ -2,8 +2,8 @@
 #define PHI_FILE_FIRST_FAILURE
 #include "model.h"
 
-/* Set *result to the status of member m if it is a failure, unless an earlier member has failed. *earliest is the number of
-   the first failed member so far. */
+/* Set *result to the status of member m if this is a failure and no member with a smaller number has failed. *earliest
+   is the smallest number of a failed member so far. */
 static void phi_report_first(phi_status status, size_t m, size_t *earliest, phi_status *result)
 {
     if (status == PHI_OK) return;

@@ -37,7 +37,7 @@ typedef struct {
 
 /* ---- The model between communication points ---- */
 
-static const double phi_fmu_slack = 1e-9;     /* a communication point may miss a time by this fraction of a step, due to rounding */
+static const double phi_fmu_slack = 1e-9;     /* times that differ by less than this fraction of a step are equal: the environment rounds communication points */
 static const double phi_fmu_most_steps = 1e9; /* largest number of whole steps in a communication step; it fits any size_t */
 
 /* Modes of an FMU, as bits, so that a sum of modes says in which of them a call is allowed. */
@@ -49,7 +49,7 @@ typedef struct {
     phi_solver now;  /* solver at the communication point, whose values are the outputs */
     double origin;   /* time of the environment minus that of the solver */
     double time;     /* time of the communication point */
-    double stop;     /* no communication step may end after this time; infinity if the environment names none */
+    double stop;     /* no communication step may end after this time; infinity if the environment sets none */
     double step;     /* size of a whole step */
     int32_t seed;    /* seed of the random numbers */
     int32_t mode;    /* one of the modes */
@@ -72,7 +72,7 @@ static void phi_fmu_reset(phi_fmu_state *f)
 /* Time of the environment for the state of a solver. */
 static double phi_fmu_time(const phi_fmu_state *f, const phi_solver *s) { return f->origin + (double)PHI_TIME_OF(s); }
 
-/* Let whole steps begin at the present communication point. */
+/* Make the present communication point the start of the following whole steps. */
 static void phi_fmu_begin_grid(phi_fmu_state *f)
 {
     f->origin += f->time - phi_fmu_time(f, &f->now);
@@ -96,7 +96,7 @@ static phi_status phi_fmu_start(phi_fmu_state *f)
     return PHI_OK;
 }
 
-/* Largest distance at which a time counts as the target, due to rounding. */
+/* Times that differ from the target by less than this, by rounding, count as the target. */
 static double phi_fmu_tolerance(const phi_fmu_state *f, double target)
 {
     const double roundoff = (sizeof(phi_real) == sizeof(double) ? 1e-15 : 5e-7) * fmax(fabs(target), fabs(f->origin));

@@ -25,7 +25,7 @@ FMI_SHARED void *FMI2_NAME(Instantiate)(const char *name, fmi2Type type, const c
 
 FMI_SHARED void FMI2_NAME(FreeInstance)(void *of) { free(of); }
 
-/* FMI 2.0 sets the start and stop times here, FMI 3.0 in EnterInitializationMode. */
+/* FMI 2.0 sets the start and stop times by this function, FMI 3.0 by EnterInitializationMode. */
 FMI2_STATUS(SetupExperiment)(void *of, int has_tolerance, double tolerance, double start, int has_stop, double stop)
 {
     const fmi3Status status =

@@ -93,7 +93,8 @@ FMI3_STATUS(ExitInitializationMode)(void *of)
 
 FMI3_STATUS(EnterEventMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING, PHI_AT_EVENT); }
 
-/* After the initialisation, environments with event mode call this too, although the FMU is already in step mode. */
+/* After the initialisation, environments with event mode also call this function, although the FMU is already in step
+   mode. */
 FMI3_STATUS(EnterStepMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING | PHI_AT_EVENT, PHI_STEPPING); }
 
 FMI3_STATUS(Terminate)(void *of) { return phi_fmi3_enter(of, ~0, PHI_TERMINATED); }
@@ -181,7 +182,7 @@ FMI3_ABSENT(GetNumberOfEventIndicators, (void *of, size_t *n))
 FMI3_ABSENT(GetNumberOfContinuousStates, (void *of, size_t *n))
 FMI3_ABSENT(ActivateModelPartition, (void *of, uint32_t v, double time))
 
-/* Newly set parameters take effect with the next step; events do nothing else. */
+/* New values of parameters take effect with the next step; events do nothing else. */
 FMI3_STATUS(UpdateDiscreteStates)(void *of, bool *again, bool *terminate, bool *nominals, bool *states, bool *has_next,
     double *next)
 {

@@ -37,7 +37,7 @@ static void phi_sample(const phi_params *params, const double x[PHI_DIM], double
 }
 
 /* The leading error of the method with this gauge: the sum of |pi grad S_3|^2 over the samples, where S_3 is the first
-   error term of the modified Hamiltonian. */
+   error term in the Hamiltonian that steps follow (the modified Hamiltonian). */
 static double phi_gauge_error(const phi_params *params, const double gauge[PHI_GAUGES], double samples[][PHI_DIM])
 {
     double error[PHI_DIM], sum = 0.0;
@@ -48,8 +48,8 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
     return sum;
 }
 
-/* Value of the error, a polynomial in one factor of the gauge, at centre + t width, by Newton's formula from its forward
-   differences. */
+/* Value of the error at gauge[c] + t width, by Newton's formula from its forward differences: the error is a polynomial
+   in gauge[c]. */
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
     double error = difference[PHI_DEGREE];

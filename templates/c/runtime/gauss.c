@@ -53,9 +53,9 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* Compute the factors f_j of the stage increments in the collocation polynomial at a fraction of a step, minus its value at
-   the end of the step. They are the integrals of the Lagrange polynomials from 1 to the fraction, divided by the weights;
-   they are computed by sums of Legendre polynomials. */
+/* Compute the factors f_j of the stage increments in (collocation polynomial at a fraction of a step) - (its value at
+   the end). They are the integrals of the Lagrange polynomials from 1 to the fraction, divided by the weights; they are
+   computed by sums of Legendre polynomials. */
 static void phi_factors_at(double fraction, double factor[PHI_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -94,8 +94,8 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
     return 1.0 / square;
 }
 
-/* Squared change of the unknowns by a sweep, as a mean over the stages. Changes of coordinates and functionals have the
-   weight scale, those of group elements the weight element_scale. */
+/* Squared change of the unknowns by a sweep, as a mean over the stages. The first PHI_PLAIN unknowns have the weight
+   scale, the others, group elements, the weight element_scale. */
 static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -137,8 +137,8 @@ static int phi_best_predictor(phi_history *past, double scale, double element_sc
 }
 
 #else
-/* Squared change of the unknowns by a sweep, as a mean over the stages. Changes of coordinates and functionals are relative
-   to |x|, or to their increments if x = 0; group elements have sizes near 1. */
+/* Squared change of the unknowns by a sweep, as a mean over the stages. The first PHI_PLAIN unknowns are relative to
+   |x|, or to their increments if x = 0; the others have sizes near 1. */
 static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
 {
     double square = DBL_MIN, sum[PHI_NODES] = { 0.0 };
@@ -156,7 +156,8 @@ static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lane
 
 #endif
 #if PHI_FRAMED
-/* Transform stage increments of a step, which begins at point, to the frame at its end, which the next step uses. */
+/* Transform the stage increments of a step that begins at point to the frame at the end of the step, which the next
+   step uses. */
 static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments,
     double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
@@ -216,8 +217,8 @@ typedef struct {
     int rising, rises;
 } phi_progress;
 
-/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if not. Updates *usual,
-   the factor by which they shrink, and *first, the sweep from which the next step measures. */
+/* Convergence test: 1 at rounding level, 0 to continue, -1 if too many changes grew. Updates *usual, the factor by
+   which changes shrink, and *first, the sweep from which the next step measures them. */
 static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep, double change)
 {
     const double rate = change / sweeps->last;

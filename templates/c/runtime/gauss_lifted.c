@@ -5,8 +5,8 @@
 #include <string.h>
 
 /* ---- Frames of group elements ---- */
-/* The unknowns contain quaternions F ("frames") such that the vector y, a linear function of x, is F* k F. In a step F
-   becomes F + w, the frame of the next step. Compute the first F: a rotation from y to k or -k, whichever is nearer, times
+/* The unknowns contain quaternions F ("frames"): F* k F is the vector y, a linear function of x. In a step F becomes F
+   + w, the frame of the next step. Compute the first F: a rotation from y to k or to -k, whichever is nearer, times
    |y|^1/2. */
 static void phi_lift_one(const double y[3], double f[4])
 {

@@ -74,7 +74,7 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
         s->middle[i] = end += s->middle[i];
     }
     s->bonds[sites] = end;
-    for (size_t k = count; k-- > 0;) { /* in reverse, since entries move the end of a list to its start */
+    for (size_t k = count; k-- > 0;) { /* in reverse: the entries of a site are placed last to first */
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         const int begins = --s->bonds[a], ends = --s->middle[b];
         s->other[begins] = (int)b;

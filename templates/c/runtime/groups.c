@@ -11,7 +11,7 @@
 enum {
     PHI_GROUP = PHI_LANES,              /* number of members, one in each lane */
     PHI_FEWEST = 3,                     /* measured: fewer members are faster one by one */
-    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps that repay a fit; measured. They are many, since it predicts one solution, and not eight as in a block */
+    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* number of steps that repay a fit; measured. It is large, since a fit predicts one solution, not eight as in a block */
     PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* slow steps until recurrences that did not help are fitted again */
 };
 
@@ -87,7 +87,7 @@ static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[re
     }
 }
 
-/* Select the predictor of a stage: the one that would have predicted its solutions y best. */
+/* Select the predictor of a stage that would have predicted its solutions y best. */
 static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     phi_lanes row[PHI_HISTORY + 1][PHI_DIM];
@@ -137,8 +137,8 @@ static void phi_group_fit(phi_group *group)
     group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
 }
 
-/* In each lane whose prediction y is not near the values `last`, replace it by these: far away the equation of a step has
-   solutions unrelated to the motion. */
+/* In each lane whose prediction y is not near `last`, set y to `last`: far away, the equation of a step has solutions
+   unrelated to the motion. */
 static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict PHI_DIM])
 {
     phi_lanes distance = { 0.0 }, size = { 0.0 };

@@ -1,13 +1,18 @@
 #ifndef PHI_FILE_HISTORY_GAUSS_H
 #define PHI_FILE_HISTORY_GAUSS_H
+#if PHI_LIFTED
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
-   only, except for a frame, which belongs to the state. */
+   only, but frame and frame_carry belong to the state. Unknowns are offsets from a state. */
+#else
+/* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
+   only. Unknowns are offsets from a state, their frame. */
+#endif
 typedef struct {
     int count;     /* number of steps in increments */
 #if PHI_STAGED
     int latest;    /* index of the last step in increments */
 #endif
-    int sweeps;    /* number of the first sweep over the stages whose change is measured */
+    int sweeps;    /* number of the first sweep whose change is measured */
 #if PHI_STAGED
     int predictor; /* row of phi_prediction that predicts the next step */
     int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
@@ -17,7 +22,7 @@ typedef struct {
     double h;      /* size of the last step */
 #if PHI_LIFTED
     int lifted;    /* whether frame has been computed; after a kick it still belongs to the former state */
-    double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* quaternions F with y = F* k F for vectors y, linear in x; and their compensation terms */
+    double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* quaternions F with F* k F = y, where the vectors y are linear functions of x; compensation terms of F */
 #endif
 #if PHI_STAGED
     double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame at the end of the last step */

@@ -6,9 +6,9 @@
 
 #include "lattice_predictor.h"
 
-/* A solver, initialised by phi_init. Its arrays lie in memory of the caller, so a copy is no independent solver. Fields are
-   stored in rows along the last axis. If steps read neighbours, a row has a halo: copies of the other end beside each end.
-   Callers may only read the struct. */
+/* A solver, initialised by phi_init. Its arrays lie in memory of the caller, so a copy is no independent solver. Fields
+   are stored in rows along the last axis. If steps read neighbours, a row has a halo: beside each end, copies of the
+   sites at the opposite end. Callers may only read the struct. */
 typedef struct {
 #include "state_of_lattice.h"
 } phi_solver;
@@ -20,7 +20,7 @@ typedef struct {
 phi_status phi_init_at(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, double t0, void *work);
 
 /* Select the random numbers of the next steps: a function of seed, ensemble member, number of the step (`step` for the
-   next, below 2^48) and site. phi_init sets the first three to 0. */
+   next, below 2^48) and site. phi_init sets seed, member and step to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
 /* Declare that this lattice is a part of a larger one with `planes` planes along the first axis, of which plane 0 here is
@@ -53,19 +53,19 @@ size_t phi_tangent_size(const phi_solver *s, size_t count);
 phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
 phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work);
 
-/* Make many steps as phi_integrate does, and their reverse pass (vector-Jacobian product). rows[row][field][site], if not
-   NULL, receives the states after stride, 2 * stride, ... steps and at the end. For L = sum of rows_bar * rows,
-   x0_bar[field][site] receives the derivatives of L by the initial state, and those by the parameters are added to
-   *params_bar, if not NULL; its arrays have a number for each site or bond, or are NULL. Derivatives are exact to
-   round-off. trail is work space of `size` bytes, at least phi_trail_size(s, 1). With phi_trail_size(s, steps) bytes, each
-   step is computed once; with less, steps are computed again from stored states, most of them once more. On failure all
-   arguments are unchanged. */
+/* Make many steps as phi_integrate does, and their reverse pass (vector-Jacobian product). rows[row][field][site], if
+   not NULL, receives the states after stride, 2 * stride, ... steps and at the end. For L = sum of rows_bar * rows,
+   x0_bar[field][site] receives the derivatives of L by the initial state. The derivatives of L by the parameters are
+   added to *params_bar, if params_bar is not NULL; its arrays have a number for each site or bond, or are NULL.
+   Derivatives are exact to round-off. trail is work space of `size` bytes, at least phi_trail_size(s, 1). With
+   phi_trail_size(s, steps) bytes, each step is computed once; with less, steps are computed again from stored states,
+   most of them once more. On failure all arguments are unchanged. */
 size_t phi_trail_size(const phi_solver *s, size_t steps);
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
     double *x0_bar, phi_params_bar *params_bar, void *trail, size_t size);
 
-/* Set a function that phi_pullback calls from time to time; if it does not return 0, phi_pullback returns PHI_STOPPED.
-   NULL for none. */
+/* Set a function that phi_pullback calls from time to time, or NULL for none. If the function does not return 0,
+   phi_pullback stops and returns PHI_STOPPED. */
 void phi_ask(phi_solver *s, int (*stop)(void));
 
 /* phi_pullback for one step; trail has phi_trail_size(s, 1) bytes, and x0_bar may be x1_bar. */
@@ -90,9 +90,9 @@ phi_status phi_kick(phi_solver *s, const double *change);
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
-/* Save and restore a run: it continues with the same bits. phi_saved writes far and arrays x[array][site], and returns
-   their number: at most that of fields, or three times that with compensated steps. To restore, call phi_resume with these
-   after phi_init. */
+/* Save a run, and restore it so that it continues with the same bits. phi_saved writes *far, and arrays x[array][site];
+   it returns the number of arrays, at most that of fields, or three times that with compensated steps. To restore, call
+   phi_init, then phi_resume with these values. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far);
 

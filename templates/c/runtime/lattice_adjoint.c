@@ -64,8 +64,8 @@ static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, cons
 }
 
 #endif
-/* Number of steps to make until the next checkpoint, out of the steps left; at least g->longest. Without room for another
-   checkpoint, all but the last g->longest steps are made. */
+/* Number of steps, out of the steps left, until the next checkpoint; at least g->longest. If there is no room for
+   another checkpoint, it is the number of all steps but the last g->longest. */
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
     const size_t free = g->most - g->count, parts = free > 1 ? free / 2 + 1 : 2;

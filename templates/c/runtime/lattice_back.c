@@ -28,8 +28,8 @@ static void phi_store_units(const phi_solver *s, const double *from, double *to,
 #endif
 }
 
-/* Compute the offsets in memory of the rows whose terms contribute cotangents to a row. Beyond open ends it is the row of
-   zeros that follows all others. */
+/* Compute the offsets in memory of the rows whose terms contribute to the cotangents of a row. For rows beyond open
+   ends, it is the offset of the row of zeros that follows all other rows. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
     ptrdiff_t place[PHI_AXES];

@@ -6,9 +6,10 @@
 #include "sweeps.h"
 
 /* ---- Relative coordinates of bodies ---- */
-/* Flows act on relative positions and velocities; the values of the first body are those of the centre of mass of all
-   bodies. In Jacobi coordinates, the values of another body are relative to the centre of mass of all bodies before it. In
-   democratic heliocentric coordinates, positions are relative to the first body, and velocities to the centre of mass. */
+/* Flows act on relative positions and velocities. In place of the first body they have the position and the velocity of
+   the centre of mass of all bodies. In Jacobi coordinates, the values of each later body are relative to the centre of
+   mass of all bodies before it. In democratic heliocentric coordinates, positions are relative to the first body, and
+   velocities to the centre of mass. */
 
 /* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative, their
    sum must be finite, and the first body, and bodies with momenta, must have one. */

@@ -11,11 +11,12 @@
 
 /* ---- Checkpoints and tape ---- */
 #if !PHI_SERIES
-/* Number of flows of a step in a run, where the last flow of a step is merged with the first of the next step. */
+/* Number of flows that a step of a run makes, since the last flow of a step is merged with the first flow of the next
+   one. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
-/* Number of the row of coefficients for a flow of a step: PHI_FLOWS if it is the first flow, merged with the last flow of
-   the step before (continues = 1). */
+/* Number of the row of coefficients for a flow of a step. For the first flow, if it is merged with the last flow of the
+   step before (continues = 1), it is PHI_FLOWS. */
 static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
 
 #endif
@@ -75,12 +76,13 @@ static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state
 }
 
 #if PHI_SERIES
-/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as possible with checkpoints of
-   all segments, so that each step is made at most twice. If these never fit, tape and checkpoints get one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as possible with room for the
+   checkpoints of all segments, so that each step is made at most twice. If there is never room for them, tape and
+   checkpoints get one half each. */
 #else
-/* Divide the memory between the tape of one segment and checkpoints. The tape of a segment fills the cache, or is longer if
-   only then checkpoints of all segments fit; each step is then made at most twice. If these never fit, tape and checkpoints
-   get one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. The tape of a segment fills the cache. It is
+   longer if there is room for the checkpoints of all segments only then; each step is then made at most twice. If there
+   is never room for them, tape and checkpoints get one half each. */
 #endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
@@ -129,8 +131,8 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 
 enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
 
-/* Whether the caller wants to stop: calls s->stop, but only after PHI_UNASKED site updates since the last call. steps is the
-   number of steps made since this function was called last. */
+/* Whether the caller wants to stop: calls s->stop if there were PHI_UNASKED site updates since its last call. steps is
+   the number of steps made since the last call of the present function. */
 static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 {
     g->unasked += steps * s->sites;

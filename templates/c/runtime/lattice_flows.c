@@ -36,7 +36,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 
 #endif
 #if PHI_BY_COLOUR
-/* Apply flows of a step: kind 0 the first, 1 all inner ones, 2 the last, 3 all inner ones in reverse. */
+/* Apply flows of a step that has one for each colour: 0 first, 1 inner, 2 last, 3 inner in reverse. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
 {
 #if PHI_TIMED
@@ -76,7 +76,7 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 /* Make some steps. Before the first steps of a run, apply the flows of the corrector; for 0 steps, apply only the flows of
    the corrector at the end of a run. */
 #else
-/* Make some steps but for the last flow, which the next step merges; 0 steps: make the last flow alone. */
+/* Make steps without the last flow, which the next step includes. For 0 steps, make only the last flow. */
 #endif
 #if PHI_SHARED
 static void phi_shared_steps(const phi_solver *s, size_t steps)
@@ -151,8 +151,13 @@ static int phi_close(phi_solver *s)
     return done;
 }
 
-/* Make steps from the state s->before, which equals s->x, except for the last flow of the last step. Values are checked
-   after several steps; if they are not finite, these steps are repeated one by one. */
+#if PHI_NOISE
+/* Make steps from the state in s->before, which s->x has too. Values are checked after several steps; if they are not
+   finite, these steps are repeated one by one. */
+#else
+/* Make steps from the state in s->before, which s->x has too. The last flow of the last step is not made. Values are
+   checked after several steps; if they are not finite, these steps are repeated one by one. */
+#endif
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
     const size_t end = s->steps + steps;
@@ -196,11 +201,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #else
     if (!s->open) phi_to_relative(s, s->x);
     if (!s->open) phi_clear_other_carry(s);
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if the last flow is still to be merged with the next, the state is s->before */
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if s->open, continue from s->before: its last flow is merged with the next one */
 #endif
     status = phi_march(s, steps);
 #if !PHI_NOISE
-    if (s->open && !PHI_TRY_FLOWS) { /* makes the last flow; s->before remains before it */
+    if (s->open && !PHI_TRY_FLOWS) { /* makes the last flow; s->before stays without it */
         status = PHI_NOT_FINITE;
         s->open = 0;
         --s->steps;

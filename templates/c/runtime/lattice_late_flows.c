@@ -4,7 +4,7 @@
 #include "model.h"
 #include "lattice_monitor.c"
 
-/* Multiply the tangent vectors by the derivative of a flow over the time tau / rate, which depends on the state by rate. */
+/* Multiply the tangent vectors by the derivative of a flow over the time tau / rate, where rate depends on the state. */
 static void phi_carry_vectors(const phi_solver *s, int part, double time, double rate)
 {
     size_t first, end = phi_share(phi_units(s), &first);

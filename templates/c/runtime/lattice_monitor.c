@@ -38,8 +38,8 @@ static double phi_part_energy(const phi_solver *s, int part)
     return phi_sum_of_densities(s);
 }
 
-/* A + e for the part log(A + e) of K, or -B for the part -log(-B). The flow of the part of K over a time equals the flow of
-   A or B over that time divided by this value. */
+/* The number by which times are divided: A + e for the part log(A + e) of K, -B for the part -log(-B). The flow of a
+   part of K over a time is the flow of A or B over that time divided by this number. */
 static double phi_rate(const phi_solver *s, int part)
 {
     const double energy = phi_part_energy(s, part);

@@ -51,7 +51,7 @@ static void phi_reverse_flows(const phi_solver *s, const phi_flow *flows, size_t
 enum { PHI_DEEPEST = 1 }; /* number of flows that are processed together */
 #endif
 
-/* Append the reverse pass of flow `number` of a step, for the cotangents bar, to the queue of *count flows. The queue is
+/* Append the reverse pass of flow `number` of a step, for the cotangents bar, to a queue of *count flows. The queue is
    processed when it holds `depth` flows. */
 static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
     phi_flow *flows, size_t *count, size_t depth)

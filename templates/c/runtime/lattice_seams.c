@@ -5,8 +5,8 @@
 #include "rows.c"
 
 /* ---- Seams ---- */
-/* Find where the boundary seam of each axis begins. A seam has the sites that remain after whole periods of colours, and
-   further periods if these are fewer than its smallest width. */
+/* Find where the boundary seam of each axis begins. A seam has the sites that remain after whole periods of colours. If
+   these are fewer than the smallest width of a seam, it has further periods too. */
 static void phi_find_seams(phi_solver *s)
 {
     for (int a = 0; a < PHI_AXES; ++a) {

@@ -10,7 +10,7 @@
    on the division into segments. */
 #define PHI_UNLIKE (450.0 * DBL_EPSILON) /* largest accepted difference from the stored state, relative to the largest value of all fields; 1e-13 in double precision */
 
-/* Number of legs for a number of steps; leg is the number of steps in one. */
+/* Number of legs into which `steps` steps are divided; a leg has `leg` steps, the last one may have fewer. */
 static size_t phi_legs(size_t steps, size_t leg) { return steps / leg + (steps % leg > 0); }
 
 /* Number of bytes on the tape for one leg. */

@@ -28,8 +28,8 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 }
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The effect of the
-   last correction on the increment is added to first order, without another evaluation. So a solution is accepted if its
-   error, quadratic in the last correction, is below PHI_TOLERANCE. */
+   last correction on the increment is added to first order, without another evaluation. So iterations end if the next
+   correction, quadratic in the last, is expected below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];

@@ -66,8 +66,8 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #define PHI_BLOCK_ROUNDING 1e-10
 #define PHI_CAUTION 32.0 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 
-/* Estimate the size of the next correction from the last one, `size`, and the one before it: the square of the first; later
-   size times the ratio size / before, with a safety margin. It is 0 at rounding level. */
+/* Estimate the size of the next correction: after the first correction its square; later `size`, the size of the last
+   correction, times the ratio size / before, with a safety margin. The estimate is 0 at rounding level. */
 static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)
 {
     PHI_EACH_LANE

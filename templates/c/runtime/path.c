@@ -58,9 +58,10 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is its end minus
-   x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0 if the path is too
-   long or leaves the domain of pi. *pieces_used increases by the number of computed pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is the end of
+   the path minus x, mean is the mean of the path minus x. For any p, the end of the path lies on the symplectic leaf of
+   x. Returns 0 if the path is too long or leaves the domain of pi. *pieces_used increases by the number of computed
+   pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM], int *pieces_used)
 {

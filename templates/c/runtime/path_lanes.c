@@ -11,7 +11,7 @@
 /* ---- Blocks along paths ---- */
 #define PHI_SLOPE_ACCURACY 1e-7 /* relative accuracy of the derivatives of paths */
 #define PHI_MIDDLES_SETTLED 1e-9 /* relative accuracy of the middles of paths; Newton iterations remove the remaining error */
-#define PHI_PREDICTION_ACCURACY 1e-6 /* relative accuracy of paths in predictions, which have larger errors anyway */
+#define PHI_PREDICTION_ACCURACY 1e-6 /* relative accuracy of paths in predictions; predictions have larger errors anyway */
 
 /* Compute alpha - y (displacement) and beta - alpha (increment) to leading order, from short Taylor series of paths with the
    middle y. */

@@ -8,9 +8,10 @@
 
 #define PHI_NEAR_BY 0.125 /* largest relative change of the state after which predictors are shifted rather than cleared */
 
-/* Shift the past solutions that the extrapolation needs, after a change of the state: past solutions of a motion through the
-   new x differ by the change of the state, and by the change of the vector field times the time since then. Recurrences are
-   dropped, since they were fitted to the former motion. After a large change, the next step clears the predictors. */
+/* After a change of the state, shift the past solutions that the extrapolation needs: past solutions of a motion
+   through the new x differ by the change of the state, and by the change of the vector field times the time since then.
+   Recurrences are dropped, since they were fitted to the former motion. After a large change, the next step clears the
+   predictors. */
 static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0, before[PHI_DIM], slope[PHI_DIM];

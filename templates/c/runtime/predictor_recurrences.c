@@ -45,7 +45,8 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return last >= 0 && phi_near(value, history->past[last]);
 }
 
-/* Select the predictor that would have predicted `value` best, a solution that took several iterations. */
+/* After a step with several iterations, whose solution is `value`: select the predictor that would have predicted it
+   best. */
 static void phi_judge(phi_history *history, const double value[PHI_DIM])
 {
     double row[PHI_HISTORY + 1][PHI_DIM], predicted[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;

@@ -11,7 +11,7 @@ const char *phi_status_string(phi_status status); /* the meaning of a status */
 
 #include "blocks_measurements.h"
 
-/* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
+/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
 typedef struct {
 #include "state_members.h"
 } phi_solver;
@@ -36,9 +36,9 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 /* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
-/* Select the random numbers of the next steps. They are a function of seed, ensemble member and number of the step, which is
-   `step` for the next one; phi_init sets all three to 0. Each increment of the noise is normal with variance |h|, truncated
-   at PHI_BOUND sqrt(|h|). */
+/* Select the random numbers of the next steps. They are a function of seed, ensemble member and number of the step,
+   which is `step` for the next step; phi_init sets seed, member and step to 0. Each increment of the noise is normal
+   with variance |h|, truncated at PHI_BOUND sqrt(|h|). */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
 /* Set the attitude of the present state. phi_init sets the identity. */
@@ -53,9 +53,9 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
 #if PHI_MONITOR
-/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). All steps with the same e follow one Hamiltonian. */
+/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). For fixed e, a step is an exact Poisson map. */
 #elif PHI_GAUGE
-/* As phi_init, with given factors of the Casimirs, whose multiples are subtracted from H. */
+/* As phi_init, with a given gauge: steps subtract gauge[k] times Casimir k from H. */
 #endif
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
@@ -80,9 +80,9 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 /* Between steps: replace the parameters; the state is unchanged. Returns PHI_BAD_ARGUMENT, with *s unchanged, for
    parameters that phi_init refuses. */
 #if PHI_MONITOR
-/* The energy level e becomes -H with the new parameters. */
+/* The energy level e becomes -H of the present state with the new parameters. */
 #elif PHI_GAUGE
-/* The gauge is unchanged. */
+/* The gauge, the factors of Casimirs in s->gauge, is unchanged. */
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
@@ -97,7 +97,7 @@ phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const doub
 phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their last good
-   state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+   state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
 #if PHI_GROUPS || PHI_PACKS
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 #endif
@@ -121,8 +121,9 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
 /* phi_ensemble for members with parameters params[m], energy level gauge[m] and step size h[m]. params may be NULL for the
    defaults, gauge for -H of the initial states. */
 #elif PHI_GAUGE
-/* phi_ensemble for members with parameters params[m], step size h[m], and factors gauge[m * PHI_GAUGES + k] of Casimirs.
-   params may be NULL for the defaults, gauge for factors chosen at the initial states. */
+/* phi_ensemble for members with parameters params[m], step size h[m], and gauge: gauge[m * PHI_GAUGES + k] is the
+   factor by which Casimir k is subtracted from H. params may be NULL for the defaults, gauge for factors chosen at the
+   initial states. */
 #else
 /* phi_ensemble for members with separate parameters params[m] and step sizes h[m]. params may be NULL for the defaults. */
 #endif
@@ -153,13 +154,15 @@ phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PH
 phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM], double x0_bar[PHI_DIM],
     phi_params *params_bar);
 
-/* Make many steps as phi_integrate does, and their reverse pass (vector-Jacobian product) for a number L. rows[r * PHI_DIM +
-   i], if rows is not NULL, receives x_i after stride, 2 * stride, ... steps and at the end; with stride = steps there is one
-   row. rows_bar are the derivatives of L by these rows. x0_bar receives its derivatives by the initial state, and those by
-   the parameters are added to *params_bar, if not NULL. trail is work space for the tape: PHI_TRAIL numbers for each step. */
+/* Make many steps as phi_integrate does, and their reverse pass (vector-Jacobian product) for a number L. rows[r *
+   PHI_DIM + i], if rows is not NULL, receives x_i after stride, 2 * stride, ... steps and at the end; with stride =
+   steps there is one row. rows_bar are the derivatives of L by these rows. x0_bar receives the derivatives of L by the
+   initial state; the derivatives of L by the parameters are added to *params_bar, if params_bar is not NULL. trail is
+   work space for the tape: PHI_TRAIL numbers for each step. */
 #if PHI_MONITOR
-/* The derivative of L by the energy level e is added to *e_bar, if not NULL. If phi_init has set e = -H(x0), call
-   phi_level_bar with this derivative: it adds the derivatives of L that act through e to x0_bar and *params_bar. */
+/* The derivative of L by the energy level e is added to *e_bar, if e_bar is not NULL. If phi_init has set e = -H(x0),
+   then call phi_level_bar with this derivative: it adds the derivatives of L that act through e to x0_bar and
+   *params_bar. */
 #endif
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
     double x0_bar[PHI_DIM], phi_params *params_bar PHI_AND_DOUBLE(e_bar), double *trail);

@@ -11,8 +11,8 @@
 #include "path_tangent_policy.h"
 #include "tangent_product.c"
 
-/* Whether the slopes of the Taylor series of a path and of its variation, at a point m, satisfy their differential
-   equations. */
+/* Whether the slopes of the Taylor series of a path and of its variation satisfy their differential equations at a
+   point m. */
 static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], const double m[2 * PHI_DIM],
     const double slope[2 * PHI_DIM])
 {
@@ -54,8 +54,9 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
     return 0;
 }
 
-/* Compute the end (change) and the mean of the whole path from x with covector p, minus x; each followed by its variation
-   under a variation of x[seed], or of p[seed - PHI_DIM] if seed >= PHI_DIM. Returns 0 if the path cannot be followed. */
+/* Compute the end (change) and the mean of the whole path from x with covector p, both minus x. Each is followed by its
+   variation under a variation of x[seed], or of p[seed - PHI_DIM] if seed >= PHI_DIM. Returns 0 if the path cannot be
+   followed. */
 static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], int seed,
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {

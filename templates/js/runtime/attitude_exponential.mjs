@@ -6,7 +6,7 @@ const smallCovector = new Float64Array(COVECTOR);
 const squared = new Float64Array(ELEMENT);
 
 /**
- * Compute exp(P) - 1 for the matrix P that the numbers covector define: exp(P/2^k) is squared k times. The
+ * Compute exp(P) - 1, where the numbers covector define the matrix P: exp(P/2^k) is squared k times. The
  * last of these numbers bounds the square of the norm of P. Each squaring doubles rounding errors, so
  * orthogonal matrices are made orthogonal again after it.
  */

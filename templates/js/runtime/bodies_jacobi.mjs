@@ -48,7 +48,8 @@ export function placed(x, sites) {
 }
 
 /**
- * Subtract from the acceleration of each body, in the sums, that of the centre of mass of all bodies before.
+ * Subtract from the acceleration of each body, in the sums, that of the centre of mass of all bodies
+ * before it.
  */
 export function joinSums(x, sites, first) {
   const m = sites.params[MASS];

@@ -34,7 +34,8 @@ function sampled(params, x) {
 }
 
 /**
- * The leading error of the method: the sum of |pi grad S_3|^2 over the samples; S_3 is its first error term.
+ * The leading error of the method: the sum of |pi grad S_3|^2 over the samples. S_3 is the first error
+ * term in the Hamiltonian that steps follow (the modified Hamiltonian).
  */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
@@ -46,7 +47,9 @@ function gaugeError(params, gauge, samples) {
   return sum;
 }
 
-/** Value of the error, a polynomial in one factor, at centre + t width, from its forward differences. */
+/**
+ * Value of the error at gauge[c] + t width, from its forward differences; it is a polynomial in gauge[c].
+ */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
   for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;

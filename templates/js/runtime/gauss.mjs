@@ -33,7 +33,9 @@ export class History {
     this.stored = false;
   }
 
-  /** Note that the state has changed: increments of the last step predict the next, but do not lead to x. */
+  /**
+   * Record that the state has changed: increments of the last step predict the next, but do not lead to x.
+   */
   shift() {
     this.kicked = true;
   }
@@ -52,9 +54,10 @@ export function forgetSteps(solver) {
 }
 
 /**
- * The factors f_j of the stage increments in the collocation polynomial at a fraction of a step, minus its
- * value at the end of the step. They are the integrals of the Lagrange polynomials from 1 to the fraction,
- * divided by the weights; they are computed by sums of Legendre polynomials.
+ * The factors f_j of the stage increments in the difference between the collocation polynomial at a
+ * fraction of a step and its value at the end of the step. They are the integrals of the Lagrange
+ * polynomials from 1 to the fraction, divided by the weights; they are computed by sums of Legendre
+ * polynomials.
  */
 export function factorsAt(fraction) {
   const x = 2 * fraction - 1;

@@ -30,8 +30,8 @@ export function beginLevel(solver) {
 }
 
 /**
- * A + e for the part log(A + e) of K, or -B for the part -log(-B). The flow of the part of K over a time
- * equals the flow of A or B over that time divided by this value.
+ * The number by which times are divided: A + e for the part log(A + e) of K, -B for the part -log(-B). The
+ * flow of a part of K over a time is the flow of A or B over that time divided by this number.
  */
 export function rateOf(part, solver) {
   const energy = partEnergy(part, solver);

@@ -7,7 +7,6 @@ import { restoreState, savedState } from "./saving.mjs";
 import { energyAt, vectorFieldAt } from "./autonomous.mjs";
 import { BEGIN, CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, END, FRACTIONS } from "./model.mjs";
 import { NAME, ORDER, POSITIVE, SPEC_SHA256, VERSION, casimirs } from "./model.mjs";
-// Modules that only some systems need:
 import { clearHistory } from "./history.mjs";
 import { expectNonnegative } from "./nonnegative.mjs";
 import { drawStep } from "./noise.mjs";

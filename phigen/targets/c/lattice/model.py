@@ -48,7 +48,7 @@ def declarations(program: Program, step: Sweeps) -> str:
             else []
         )
     if step.partners:
-        sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are stored for each site"))
+        sizes.append(("GATHERED", _gathered(layout), "sums over bonds or pairs, stored for each site"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
     values = {
