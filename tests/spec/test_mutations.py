@@ -36,7 +36,9 @@ def meaning(text: str) -> Spec:
 
 
 def complaint(base: str, path: tuple[Any, ...], value: str) -> str:
-    """Return what is wrong with the treatment of a mutant, or "" if it is read correctly or refused with a place."""
+    """Return what is wrong when a mutant is read: the spec ``base`` with the value at ``path`` replaced by ``value``.
+    The result is "" if the mutant is read correctly or refused with a place.
+    """
     tree = tree_of(BASES[base])
     text = document(replaced(tree, path, value))
     try:
@@ -66,7 +68,8 @@ def test_a_mutant_is_read_as_what_it_says_or_refused_at_its_place(base: str, see
     assert {mutant: said for mutant, said in complaints.items() if said} == {}
 
 
-#: Mutants that must be refused. They are regression tests: each was once misread, or ended in an internal error.
+#: Mutants, specs with one replaced value, that must be refused. They are regression tests: each was once misread, or
+#: ended in an internal error.
 DEFECTS = [
     ("plane", ("runs", "a", "initial", "scale"), "[q]"),
     ("plane", ("runs", "a", "initial", "scale"), "{random: normal}"),
