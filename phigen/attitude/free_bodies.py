@@ -141,7 +141,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
     The identities of `phigen.splitting.euler` prove this. The time derivative of S is CD.
     """
     yield from _shortest_rotation()
-    for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of these
+    for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of one of these
         yield from _angle(order)
 
 

@@ -70,8 +70,8 @@ def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra
     if not isinstance(form, LieAlgebraForm):
         return None
     if form.family:
-        # The dimension is checked before the matrices are built: for a typing error such as so(1000) that would take
-        # minutes.
+        # The dimension is checked before the matrices are built. Building them would take minutes for a typing error
+        # such as so(1000).
         _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:

@@ -1,6 +1,7 @@
 """The kinds of bi-realisations, by name.
 
-A new kind is a module with KIND, its name, and the function ``build``; it is imported and listed here.
+Each kind has a module, which is imported and listed here. Its constant KIND is the name of the kind, and its function
+``build`` makes the bi-realisation.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         raise refuse(f"birealisation {KIND} needs a linear or affine π; this π is {system.shape}")
     terms, explanation = closed_product(dual.algebra)
     n, size = system.dimension, dual.algebra.dimension
-    if any(i < n <= b for i, _, b, _ in terms):  # a term with p_z of the extension
+    if any(i < n <= b for i, _, b, _ in terms):  # a term contains p_z of the central extension
         raise refuse(f"birealisation {KIND} is not defined for this affine π", "try exponential")
     x = [symbol(c) for c in system.coordinates]
     increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))

@@ -139,7 +139,7 @@ class _Trivialised:
     """Solver of the linear equations for R⁻¹ and L⁻¹, where R and L are the right and left trivialised derivatives of
     the map τ.
 
-    It eliminates in the field of rational functions of p and of the functions of p that occur in τ.
+    The equations are solved by elimination, with rational functions of p and of the functions of p that occur in τ.
     """
 
     def __init__(self, system: System, representation: Representation, tau: Matrix) -> None:

@@ -48,8 +48,9 @@ def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
 
 
 def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
-    """Return exp(Y)*Ω up to the weight ``top``: the 2-form Ω, given by ``forms``, pulled back by one factor ``step`` of
-    Moser's trick."""
+    """Return the pull-back exp(Y)*Ω of a 2-form Ω up to the weight ``top``. ``forms`` has the parts of Ω, and ``step``
+    is the factor exp(Y) of Moser's trick.
+    """
     result: GradedForm = {}
     for weight, form in forms.items():
         term = form

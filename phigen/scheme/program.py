@@ -168,7 +168,7 @@ class Attitude:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the attitude, each once, which a target prints as functions."""
+        """All kernels of the attitude without repetitions; targets print them as functions."""
         return tuple(k for k in (self.turn, self.along, *self.turns, self.rate, self.exponential) if k is not None)
 
 
@@ -279,7 +279,7 @@ class Program:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the solver, each once, which a target prints as functions."""
+        """All kernels of the solver without repetitions; targets print them as functions."""
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
         attitude_kernels = self.attitude.kernels if self.attitude else ()

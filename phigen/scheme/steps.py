@@ -262,7 +262,7 @@ class Newton(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
         kernels = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
         return _present((*kernels, *factors, *self.transposed))
@@ -287,7 +287,7 @@ class Explicit(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         return _present((self.prepare, self.refresh, self.increment, self.tangent, *self.transposed))
 
 
@@ -351,7 +351,7 @@ class Path(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
         varied = (self.curvature,) if not self.lanes else ()
         kernels = (self.prepare, self.refresh, self.generate, self.eliminate)
@@ -453,7 +453,7 @@ class Gauss(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
         reduced = (self.reduced.slope, self.reduced.follow) if self.reduced else ()
         return _present((self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed))
@@ -507,7 +507,7 @@ class Splitting(_Scheduled):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         return _present((self.prepare, self.refresh, *self.flows, *self.tangents, *self.transposed))
 
 
@@ -813,7 +813,7 @@ class Sweeps(_Scheduled):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels of the step, each once, which a target prints as functions."""
+        """All kernels of the step without repetitions; targets print them as functions."""
         swept = [sweep for part in self.parts for sweep in part]
         swept += [sweep.tangent for sweep in swept if sweep.tangent]
         swept_kernels = [sweep.kernel for sweep in swept]

@@ -41,10 +41,11 @@ def beside_seams(sweep: Sweep) -> bool:
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the code for colour 0 of the sites near seams that a sweep updates; None for a sweep without a ``window``.
+    """Return the code by which the runtime marks the sites that a sweep with a ``window`` updates, for the
+    colour 0.
 
-    The runtime marks each site near seams with such a code: the bit mask of seams times the number of colours, plus the
-    colour.
+    The code of a site near seams is the bit mask of seams times the number of colours, plus the colour. Returns None
+    for a sweep without a window.
     """
     return None if sweep.window is None else sweep.window * sites.colours
 

@@ -1,4 +1,4 @@
-"""The solution of linear equations ẇ = Aw in closed form: the increment exp(tA)w − w.
+"""The increments exp(tA)w − w of the solution of linear equations ẇ = Aw, in closed form.
 
 A closed form exists if powers of A satisfy one of these relations, in which c and d are constant along the flow:
 

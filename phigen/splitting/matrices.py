@@ -28,7 +28,7 @@ from phigen.symbolic.tower import Poly
 MOST_ROWS, MOST_DEGREE = 64, 8
 
 #: The coefficients of the numerator of the Padé approximant of order 6 for exp, and the largest norm of a matrix for
-#: which it is used. Its error is then 2·10⁻¹⁷.
+#: which the approximant is used. The error of the approximant is then at most 2·10⁻¹⁷.
 PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
 MAX_PADE_NORM = 0.5
 

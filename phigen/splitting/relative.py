@@ -176,8 +176,8 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield pairs for proofs: each sum of masses M_i with a symbol, and each mass m_i with a difference of such
-    symbols.
+    """Yield pairs of a mass and its replacement in proofs: a symbol for each sum M_i, and a difference of two symbols
+    for each m_i.
 
     Masses that are numbers are left as they are.
     """
