@@ -237,13 +237,16 @@ def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
 
 def unreached(tuning: Tuning) -> str:
     """Return the message that no setting reaches the accuracy, with the reason and the smallest error."""
+    from phigen.tuning.problem import SINGLE_ROUNDING
     from phigen.tuning.search import at_floor
 
     curve, point = tuning.closest
     title = curve.title
     if point.rounding > tuning.accuracy or any(at_floor(c.points) for c in tuning.curves if c.setting):
-        explanation = "smaller steps do not help: the remaining error is rounding"
-        hint = "ask for less accuracy" + (" or a shorter --horizon" if point.error > 2 * point.measured else "")
+        single = point.unit == SINGLE_ROUNDING
+        explanation = "smaller steps do not help: the remaining error is rounding" + " in single precision" * single
+        options = ["ask for less accuracy", "a shorter --horizon"][: 1 + (point.error > 2 * point.measured)]
+        hint = " or ".join([*options, *["set real: double"] * single])
     else:
         explanation = "smaller steps would take longer than the budget allows"
         hint = "a larger --budget, or less accuracy"

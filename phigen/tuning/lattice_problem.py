@@ -19,7 +19,7 @@ from phigen.spec.model import Run, Spec
 from phigen.spec.names import BIREALISATIONS
 from phigen.study import classical, race
 from phigen.symbolic.arrays import Floats
-from phigen.tuning.problem import Candidate, Problem
+from phigen.tuning.problem import Candidate, Problem, rounding_of
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
 
 #: Number of sites of a grid above which methods are measured on a smaller grid instead.
@@ -193,7 +193,7 @@ def lattice_problem(
     values = solver.values({**reduced_start.arguments, **settings}, {}, reduced_start.sizes)
     return LatticeProblem(
         reduced_start.state.reshape(-1), values, step, span, direction, reduced_start.sizes,
-        cell=cell, whole=start.sizes, seer=flat,
+        rounding=rounding_of(compilation), cell=cell, whole=start.sizes, seer=flat,
     )  # fmt: skip
 
 

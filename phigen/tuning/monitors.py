@@ -38,10 +38,9 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.numeric import DomainError
 from phigen.tuning.building import Built, Refusal, build_all
-from phigen.tuning.problem import ROWS, Problem
+from phigen.tuning.problem import ROUNDING, ROWS, Problem
 from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
 from phigen.tuning.settings import GAUSS, SPLITTING, Setting
-from phigen.tuning.trials import ROUNDING
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0

@@ -24,6 +24,9 @@ from phigen.tuning.settings import Setting, charts
 
 #: Largest number of states at which the energy of one run is evaluated.
 ROWS = 8_000
+#: Relative change of the energy by the rounding error of one step, in double and in single precision. Over n steps,
+#: rounding errors add up to about √n times this, as a random walk.
+ROUNDING, SINGLE_ROUNDING = 1.1e-16, 6e-8
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,8 @@ class Problem(ABC):
 
     Searches begin with the size ``step``; ``horizon`` is the duration. Steps and times are positive here; ``direction``
     is −1 for a run backwards in time. ``sizes`` are the sizes of a lattice, () for other systems. Times are values of
-    the ``clock``, t or τ. It is τ if the spec has a monitor; then all methods make steps in τ.
+    the ``clock``, t or τ. It is τ if the spec has a monitor; then all methods make steps in τ. ``rounding`` is the
+    relative rounding error of one step of phigen's solvers.
     """
 
     start: Floats
@@ -42,6 +46,7 @@ class Problem(ABC):
     direction: float = 1.0
     sizes: tuple[int, ...] = ()
     clock: str = "t"
+    rounding: float = ROUNDING
 
     @property
     @abstractmethod
@@ -154,6 +159,11 @@ class SystemProblem(Problem):
             return max(measures.poisson_defect(self.system, self.parameters, step, x, signed) for x in states)
         except PhigenError:
             return None
+
+
+def rounding_of(compilation: Compilation) -> float:
+    """Return the relative rounding error of one step of the solvers that are measured. NumPy has double precision."""
+    return SINGLE_ROUNDING if compilation.program.single and chosen_target("auto") == "c" else ROUNDING
 
 
 class CompiledMethod(Protocol):

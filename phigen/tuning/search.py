@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from phigen.tuning.settings import Setting, direct, variants
-from phigen.tuning.trials import ROUNDING, Point
+from phigen.tuning.trials import Point
 
 #: A scan measures a method with step sizes that decrease by the factor FINER, at most MOST_POINTS of them.
 FINER, MOST_POINTS = math.sqrt(2.0), 48
@@ -23,8 +23,9 @@ AIM = 0.8
 DEARER = 1.25
 #: A bi-realisation is not tried at other orders if its cost exceeds the least cost by more than this factor.
 KEEP = 3.0
-#: If halving the step divides the error by less than this, the error is rounding error.
-GAIN = 1.5
+#: If halving the step divides the error by less than this, the error is rounding error, provided that it is below
+#: SMALL or this number of rounding errors of one step.
+GAIN, SMALL, MANY_ROUNDINGS = 1.5, 1e-9, 1000
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,8 @@ def at_floor(points: Sequence[Point]) -> bool:
     if len(points) < 3:
         return False
     coarser, last = points[-3], points[-1]
-    return coarser.error < GAIN * last.error and coarser.measured < 1e-9
+    small = max(SMALL, MANY_ROUNDINGS * last.unit)
+    return coarser.error < GAIN * last.error and coarser.measured < small
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
@@ -118,7 +120,7 @@ def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> 
     The result is None if rounding errors are larger than the accuracy.
     """
     last = points[-1]
-    if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
+    if at_floor(points) or accuracy < max(last.unit, last.rounding):
         return None
     return last.step * math.pow(accuracy / last.error, 1 / order)
 

@@ -9,14 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from phigen.symbolic.arrays import Floats
-from phigen.tuning.problem import CompiledMethod, Problem, steps_in
+from phigen.tuning.problem import ROUNDING, Candidate, CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
 #: Approximate number of equidistant times at which an orbit is compared with the reference solution.
 MARKS = 256
-#: Relative change of the energy by the rounding error of one step. Over n steps, rounding errors add up to about √n
-#: times this, as a random walk.
-ROUNDING = 1.1e-16
 #: Bounds of the power of time with which errors grow. An error that grows faster than the power LINEAR shows that the
 #: motion is chaotic. Below the power STEADY, the growth counts as linear, up to oscillations.
 LINEAR, STEADY = 1.8, 1.3
@@ -28,7 +25,8 @@ class Point:
 
     ``measured`` is the largest error in a run over ``time``, ``error`` the error that is expected over the whole
     duration (horizon). ``growth`` is the power of time with which the error grows, NaN if unknown; ``rounding`` is the
-    part of the error that comes from rounding, and that smaller steps do not reduce.
+    part of the error that comes from rounding, and that smaller steps do not reduce. ``unit`` is the relative rounding
+    error of one step.
     """
 
     step: float
@@ -38,6 +36,7 @@ class Point:
     nanoseconds: float
     growth: float = math.nan
     rounding: float = 0.0
+    unit: float = ROUNDING
 
     @property
     def cost(self) -> float:
@@ -81,15 +80,16 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
+        rounding_unit = _rounding_unit(problem, method)
         # Even if the measured error is 0, rounding errors are expected in a longer run.
-        largest, time = max(largest, ROUNDING), steps * h
-        growth = _growth(errors)
+        largest, time = max(largest, rounding_unit), steps * h
+        growth = _growth(errors, rounding_unit)
         ratio = max(problem.horizon / time, 1.0)
-        rounding = ROUNDING * math.sqrt(steps * ratio)
-        excess = rounding - ROUNDING * math.sqrt(steps)
+        rounding = rounding_unit * math.sqrt(steps * ratio)
+        excess = rounding - rounding_unit * math.sqrt(steps)
         error = largest + excess if bounded else largest * math.pow(ratio, growth if growth > 0.3 else 0.0) + excess
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
-        return Point(h, error, largest, time, cost, growth, rounding) if math.isfinite(cost) else None
+        return Point(h, error, largest, time, cost, growth, rounding, rounding_unit) if math.isfinite(cost) else None
 
     return measure
 
@@ -110,17 +110,23 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         expected = reference(stride * h, count)
         size = float(np.max(np.abs(expected))) or 1.0
         errors = np.max(np.abs(states - expected), axis=1) / size
-        largest = max(float(np.max(errors)), ROUNDING)
-        growth, time = _growth(errors), stride * count * h
+        rounding_unit = _rounding_unit(problem, method)
+        largest = max(float(np.max(errors)), rounding_unit)
+        growth, time = _growth(errors, rounding_unit), stride * count * h
         power = 1.0 if math.isnan(growth) or (bounded and growth < STEADY) else min(max(growth, 1.0), 2.0)
         error = largest * math.pow(max(problem.horizon / time, 1.0), power)
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
-        return Point(h, error, largest, time, cost, growth) if math.isfinite(cost) else None
+        return Point(h, error, largest, time, cost, growth, unit=rounding_unit) if math.isfinite(cost) else None
 
     return measure
 
 
-def _growth(errors: Floats) -> float:
+def _rounding_unit(problem: Problem, method: CompiledMethod) -> float:
+    """Return the relative rounding error of one step of a method; classical methods have double precision."""
+    return problem.rounding if isinstance(method, Candidate) else ROUNDING
+
+
+def _growth(errors: Floats, rounding_unit: float) -> float:
     """Return the power of time with which errors at equidistant times grow; NaN if it cannot be determined.
 
     It follows from the largest error in the first half of the run, and the largest error in the whole run.
@@ -129,4 +135,4 @@ def _growth(errors: Floats) -> float:
         return math.nan
     half_count = len(errors) // 2 + 1
     early_maximum, late_maximum = float(np.max(errors[:half_count])), float(np.max(errors))
-    return math.log2(late_maximum / early_maximum) if early_maximum > 10 * ROUNDING else math.nan
+    return math.log2(late_maximum / early_maximum) if early_maximum > 10 * rounding_unit else math.nan

@@ -67,6 +67,29 @@ def test_accuracy_beyond_rounding_is_not_reached_and_that_is_explained(phigen):
     assert "rounding" in result.stderr
 
 
+SINGLE = """phigen: 1
+name: single
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: 3*p**2/4 - sqrt(q**2/9 + 1)/2 + 3*q/8
+order: 4
+real: float
+runs: {r: {initial: [-1.012, 0.959], step: 0.05, steps: 20}}
+"""
+
+
+@pytest.mark.slow
+def test_single_precision_has_an_accuracy_that_it_can_reach(phigen, write):
+    path = write("single.yaml", SINGLE)
+    result = phigen("tune", path, "--budget", "3", "-q")
+    assert result.exit_code == 0, result.stderr
+    assert "energy error at most 0.0001 up to" in result.stdout
+    result = phigen("tune", path, "--budget", "3", "-q", "--accuracy", "1e-8")
+    assert result.exit_code == 5
+    assert "smaller steps do not help: the remaining error is rounding in single precision" in result.stderr
+    assert "hint: ask for less accuracy or set real: double" in result.stderr
+
+
 @pytest.mark.slow
 def test_chaotic_orbits_have_no_reference_over_long_times(phigen):
     result = phigen("tune", SPECS / "henon_heiles.yaml", "--run", "chaotic", "--measure", "orbit", "--budget", "3")

@@ -21,7 +21,7 @@ from phigen.spec.names import NEAR_INTEGRABLE
 from phigen.targets.header import split
 from phigen.tuning import search
 from phigen.tuning.building import Built, Refusal, build, build_all
-from phigen.tuning.problem import SystemProblem
+from phigen.tuning.problem import SINGLE_ROUNDING, SystemProblem
 from phigen.tuning.references import agreed, orbit_error
 from phigen.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.tuning.settings import GAUSS, OWN, SPLITTING, Setting, charts, own_setting, variants
@@ -80,6 +80,15 @@ def test_accuracy_below_the_rounding_cannot_be_reached():
     expected = [replace(p, rounding=1e-12) for p in points(6, [0.1, 0.07])]
     assert step_for(expected, 1e-13, 6) is None
     assert step_for(expected, 1e-11, 6) is not None
+
+
+def test_errors_at_the_floor_of_single_precision_are_rounding():
+    ladder = points(4, [0.5**k for k in range(9)], floor=4e-7)
+    assert not search.at_floor(ladder)
+    single = [replace(p, unit=SINGLE_ROUNDING) for p in ladder]
+    assert search.at_floor(single)
+    assert step_for(single, 1e-8, 4) is None
+    assert not search.at_floor(single[:5])
 
 
 def test_smaller_step_wins_where_its_iterations_are_fewer():
