@@ -14,6 +14,7 @@ import click
 from phigen import interrupts
 from phigen._version import __version__
 from phigen.cli.console import Console
+from phigen.cli.interruption import InterruptedRunError
 from phigen.errors import LimitError, PhigenError, SpecError
 
 #: The exit code that shells report for a process ended by SIGPIPE.
@@ -109,9 +110,11 @@ def _place(error: OSError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C caused the exception; libraries may convert an interrupt to an error of their own, e.g. in an
-    import."""
-    while error is not None:
+    """Whether Ctrl-C caused the exception, and its message says nothing more.
+
+    Libraries may convert an interrupt to an error of their own, for instance in an import.
+    """
+    while error is not None and not isinstance(error, InterruptedRunError):
         if isinstance(error, KeyboardInterrupt):
             return True
         error = error.__cause__ or error.__context__
