@@ -87,7 +87,7 @@ def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.A
 def sums_of_derivatives(
     parameters: Sequence[Parameter], members: Mapping[str, str], bars: Mapping[str, int]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that add derivatives with respect to parameters to the arrays in which the caller wants them.
+    """Yield the functions that add derivatives with respect to parameters to arrays of the caller.
 
     ``bars`` maps the parameters at sites and bonds to the numbers of their cotangent arrays. Parameters with one value
     for all sites have one derivative each.

@@ -92,7 +92,7 @@ def invariants(cell: Cell) -> Iterator[Statement]:
         rate = rate_of(cell, density)
         label = f"{{{name}, H}}" + f" + ∂{name}/∂{cell.time}" * (cell.time in symbols_of(density))
         terms = [(f"δ({label})/δ{n}" if "+" in label else f"δ{label}/δ{n}", e) for n, e in euler(cell, rate).items()]
-        terms.append((f"{label} where all sites are alike", _uniform(cell, rate)))
+        terms.append((f"{label} where all sites have equal values", _uniform(cell, rate)))
         statement = _decided(cell, title, terms, f"{label} telescopes, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary:
             end_statements = _at_ends(cell, title, partial(_invariant_of_box, name))

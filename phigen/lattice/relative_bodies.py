@@ -185,20 +185,20 @@ def _of_bodies(sweep: Sweep, bodies: LatticeBodies) -> Sweep:
 def _expect_supported(cell: Cell, spec: Spec) -> None:
     """Raise `SpecError` for options of the spec that cannot be combined with relative coordinates."""
     refused = {
-        "lattice": (cell.relation != PAIRS, "all bodies attract one another, as with lattice: {pairs: all}"),
-        "monitor": (spec.monitor is not None, "Kepler motions take equal steps of the time"),
+        "lattice": (cell.relation != PAIRS, "all bodies must attract one another, as with lattice: {pairs: all}"),
+        "monitor": (spec.monitor is not None, "all steps of Kepler motions have the same size in time"),
         "time": (bool(cell.time), "Kepler motions have constant parameters"),
-        "forces": (bool(cell.forces.covector or cell.forces.vector), "the parts are those of attracting bodies"),
-        "damping": (cell.forces.damping is not None, "the parts are those of attracting bodies"),
-        "noise": (bool(cell.noise), "the parts are those of attracting bodies"),
-        "adjoint": (spec.extras.adjoint, "gradients of bodies in relative coordinates are those of an ordinary spec"),
+        "forces": (bool(cell.forces.covector or cell.forces.vector), "only the attraction of bodies is integrated"),
+        "damping": (cell.forces.damping is not None, "only the attraction of bodies is integrated"),
+        "noise": (bool(cell.noise), "only the attraction of bodies is integrated"),
+        "adjoint": (spec.extras.adjoint, "gradients of bodies are offered for ordinary specs only"),
     }
     for key, (present, reason) in refused.items():
         if present:
             hint = f"remove {KEY}" if key == "lattice" else f"remove {KEY}, or {key}"
             if key == "adjoint":
                 hint = f"phigen show --expand RUN prints an ordinary spec, which takes {KEY} if it has momenta"
-            raise SpecError([spec.diagnostic((KEY,), f"{KEY}: not together with {key}: {reason}", hint)])
+            raise SpecError([spec.diagnostic((KEY,), f"{KEY} cannot be combined with {key}: {reason}", hint)])
 
 
 def _positions(cell: Cell) -> list[str]:

@@ -39,7 +39,7 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """Yield the statements that restore these members from the local variables."""
+        """Yield statements that copy the local variables back to the ``saved`` members."""
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 

@@ -435,9 +435,9 @@ def test_runs_continue_and_steps_backward_return() -> None:
 
 NOISE = "noise: {n: {hamiltonian: x, amplitude: 1}}\n"
 REFUSED = {
-    "noise": (text() + NOISE, "not together with noise"),
-    "a monitor": (text() + "monitor: log\n", "not together with monitor"),
-    "gradients": (text() + "adjoint: true\n", "not together with adjoint"),
+    "noise": (text() + NOISE, "cannot be combined with noise"),
+    "a monitor": (text() + "monitor: log\n", "cannot be combined with monitor"),
+    "gradients": (text() + "adjoint: true\n", "cannot be combined with adjoint"),
     "another force": (text().replace("/sqrt(", "*("), "no multiple of one over the distance"),
     "a charge": (text().replace("-G*m[a]*m[b]", "-m[a]**2*m[b]**2"), "not proportional"),
     "a field": (text().replace("sites: m*(", "sites: m*x**2 + m*("), "not the kinetic energy"),
