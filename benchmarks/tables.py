@@ -93,7 +93,7 @@ def _failures(study: Study) -> list[str]:
     for r in study.scans:
         if r.status not in ("ok", "too slow"):
             failed.setdefault((r.method, r.status), []).append(r.setting)
-    return [f"{m}: {status} at {', '.join(f'{h:.3g}' for h in hs)}" for (m, status), hs in failed.items()]
+    return [f"{m}: {status} at h = {', '.join(f'{h:.3g}' for h in hs)}" for (m, status), hs in failed.items()]
 
 
 def speed_up_row(study: Study) -> list[str]:
