@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: ab3580e885ae593996b8dbd1557ff216c3bc7bcc31c10adfb7ae2b6ebec78bf3
+ * body-sha256: ccf1b918c7efa58597a8deb9103f88105a1d16ded59144a7990d8933c315cb6e
  */
 #include "food_web.h"
 #include <limits.h>
@@ -77,7 +77,7 @@ typedef struct {
     const food_web_solver *s;
     double *const *x;   /* see food_web_solver */
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
-    int chosen;         /* the colour that a part of H belongs to */
+    int chosen;         /* the colour of the sites that a sweep updates */
 } food_web_row;
 
 /* Stands before loops over sites: it tells the compiler that their iterations are independent. */
@@ -90,7 +90,7 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

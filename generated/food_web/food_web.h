@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5b211cf6114ebfeeff35b7c517eab67a284154e3e3ec757664034a8b3de2a96c
+ * body-sha256: 70bda28b63af76e6220d473b44379c5b1e90694c2daaafbf44d234d936b87560
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -47,7 +47,7 @@ typedef struct {
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of coming steps with functions for arguments of any size */
+    size_t far; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: e13db7863219748d72c7d7211881554903095bbb57b5ed901eb8482166637629
+ * body-sha256: 76d8c256dede77fa9a98250ad7b727622cf69c54999f1614465e388f85ca5acf
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -256,7 +256,7 @@ static double guiding_centre_taylor_power(const double *a, const double *b, doub
     return sum / (double)k;
 }
 
-/* Coefficients of order 0 of the series of a path, except the coordinates, which are given. */
+/* Coefficients of order 0 in the series of a path; those of the coordinates are given. */
 static void guiding_centre_path_begin(const double *coef, const double p[4],
     double s[55][guiding_centre_TERMS + 1], double f[1])
 {
@@ -452,7 +452,7 @@ enum {
 };
 /* terms of a series below this, relative to the path, are rounding */
 #define guiding_centre_NEGLIGIBLE 1e-17
-/* terms in coordinate i are relative to its size + this fraction of the sum of all |x_j| */
+/* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define guiding_centre_LEAST_SHARE 1e-5
 /* rounding of the slope of a path, relative to the path and its slope */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
@@ -462,7 +462,7 @@ enum {
 #define guiding_centre_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 /* residuals below NEARLY_SOLVED are rounding if their ratio exceeds this */
 #define guiding_centre_SHRINKING 0.25
-/* a Jacobian is useful if an iteration reduces the residual to less than this fraction */
+/* a Jacobian is useful if an iteration multiplies the residual by no more than this */
 #define guiding_centre_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3b40aa73ead3eb2fbac9d241a39b008b82c84b83b2718d1708835c611182ae20
+# body-sha256: 6ce8bc5c53aa0603fcfb6ff5692bc1c55f4dcf0c275ca06b0e2f53d3a19c426a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -181,13 +181,13 @@ LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
 MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
 PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
-LEAST_SHARE = 1e-5  # terms in coordinate i are relative to its size + this fraction of the sum of all |x_j|
+LEAST_SHARE = 1e-5  # terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|
 ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the square root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
 SHRINKING = 0.25  # residuals below NEARLY_SOLVED are rounding if their ratio exceeds this
-CONTRACTING = 0.05  # a Jacobian is useful if an iteration reduces the residual to less than this fraction
+CONTRACTING = 0.05  # a Jacobian is useful if an iteration multiplies the residual by no more than this
 
 
 def _holds(coef, p, m, slope):

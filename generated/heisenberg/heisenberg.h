@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5a97ef82e4e8df6c853633c99afb08406e10ba0d7f3193a74a1e542f63e3cd68
+ * body-sha256: ae7c2eafbeef8f65eefaef6c2a756e1e9069ec7446520174936b10a492fd7f83
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -40,7 +40,7 @@ typedef struct {
     double *before[heisenberg_DIM]; /* copies of the fields, which replace them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of coming steps with functions for arguments of any size */
+    size_t far; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: f97dc525a146242f2828f11fbf53e3a79c4b00bd58b395b18eaef79d9326955e
+ * body-sha256: 26a1cd26d128b70456c17f42b9485928738e6ae5b532134332a5da137b1e0ac6
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -20,7 +20,7 @@
 /* ---- The model ---- */
 const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 
-enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* durations of flows, each with its coefficients */
+enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* rows of coefficients, one for each duration of a flow */
 enum { kepler_eccentric_ROW = 4 };            /* coefficients in a row */
 
 /* Times of the flows of a step, as fractions of h: one for each row of coefficients. */
@@ -213,8 +213,9 @@ static void kepler_eccentric_prepare(const kepler_eccentric_params *params,
     }
 }
 
-/* Indices of quantities that flows update, after the coordinates: the physical time, and a sum that becomes
-   NaN outside the domain of a logarithm. kepler_eccentric_ALONG is the number of all. */
+/* Indices of the quantities that flows update besides the coordinates: the physical time, and a sum that
+   becomes NaN outside the domain of a logarithm. kepler_eccentric_ALONG is the number of coordinates and
+   these quantities together. */
 enum { kepler_eccentric_TIME = kepler_eccentric_DIM, kepler_eccentric_DOMAIN, kepler_eccentric_ALONG };
 
 /* Make one step: the exact flows of the parts of the Hamiltonian K, one after the other. If it fails, the

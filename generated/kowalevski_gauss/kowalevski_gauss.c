@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 3fd879aa3734d512da2aa88ca06d7a34ebdc95548a6e07a18e2a4762550cee7f
+ * body-sha256: c7052c1a652b59c865d2b8bd421904ab85b553773b6c5afd286bfdf4fea70005
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -560,7 +560,7 @@ static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_pr
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
-    /* transients may grow for as many sweeps as there are stages */
+    /* changes may grow at first, in transients, for as many sweeps as there are stages */
     sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0;
     return sweeps->rising < (int)kowalevski_gauss_NODES + kowalevski_gauss_MOST_RISING ? 0 : -1;
 }

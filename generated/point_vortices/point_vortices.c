@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 7b406ef37f18720a742a323de177d64fc0ce1ddf5965cebdf55bda052c8598a7
+ * body-sha256: 9329d32d0aa8568693525b196994ea8c5a6a4d45717942ee107a995b82de32d0
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 8147c0281d49b2c88e16f481b9ea4b20c8917125ce989fd131f9d66a98f93b80
+ * body-sha256: 9cf63940a9b476d1caf871b08d0af714b1800d6a365bd7657469f8a65d06a011
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -403,7 +403,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     return fabs(H[2] - H[0]) <= quaternion_top_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
-/* Coefficients of order 0 of the series of a path, except the coordinates, which are given. */
+/* Coefficients of order 0 in the series of a path; those of the coordinates are given. */
 static void quaternion_top_path_begin(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], double f[1])
 {
@@ -684,7 +684,7 @@ enum {
 };
 /* terms of a series below this, relative to the path, are rounding */
 #define quaternion_top_NEGLIGIBLE 1e-17
-/* terms in coordinate i are relative to its size + this fraction of the sum of all |x_j| */
+/* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define quaternion_top_LEAST_SHARE 1e-5
 /* rounding of the slope of a path, relative to the path and its slope */
 #define quaternion_top_ROUNDED_SLOPE 2e-15
@@ -694,7 +694,7 @@ enum {
 #define quaternion_top_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 /* residuals below NEARLY_SOLVED are rounding if their ratio exceeds this */
 #define quaternion_top_SHRINKING 0.25
-/* a Jacobian is useful if an iteration reduces the residual to less than this fraction */
+/* a Jacobian is useful if an iteration multiplies the residual by no more than this */
 #define quaternion_top_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to

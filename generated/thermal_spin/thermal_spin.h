@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 83819924e6cb1c44a48fecb17dd5675b4dbaff78e3184a630283b767e32c35c3
+ * body-sha256: 2d4629e8d9e46c0bca4c67b81fd07a742d957512a873970859d0a7eb836f9e40
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -90,8 +90,9 @@ thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, dou
     double h, size_t steps, unsigned char *status);
 
 /* thermal_spin_ensemble with other random numbers: member m has those of `seed` and member number
-   first_member + m, from the step number first_step on. In thermal_spin_ensemble all three are 0. With
-   OpenMP, members are integrated in parallel; the results do not depend on the number of threads. */
+   first_member + m, from the step number first_step on. thermal_spin_ensemble takes 0 for seed, first_member
+   and first_step. With OpenMP, members are integrated in parallel; the results do not depend on the number of
+   threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 427477467cb6fe6e25e6fcbcc55569a29c52a409f6a3e310c2136999d721a51f
+ * body-sha256: 0856c5b56cccb0036d9c694ab94a05a468598fe5b6993bc474b877458318a2b1
  */
 #include "toda.h"
 #include <math.h>
@@ -83,7 +83,7 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

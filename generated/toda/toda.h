@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5569525d039784416fa6568ac96bdf43a1528473bf90fe67b010bf2705411646
+ * body-sha256: 2f97f18e549dffa1557e69a2c55833ecf30b424e554a91d8cbef5274dfa95c99
  */
 #ifndef TODA_H
 #define TODA_H
@@ -38,7 +38,7 @@ typedef struct {
     double *x[toda_ARRAYS]; /* fields, then parameters at sites, each from its first site */
     double *before[toda_DIM]; /* copies of the fields, which replace them if a step fails */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of coming steps with functions for arguments of any size */
+    size_t far; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */

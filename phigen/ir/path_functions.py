@@ -187,7 +187,7 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
     rules = build.rules()
     later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
     point = [ir.vectors(ir.Vector(series), E), *[ir.vectors(values, F)] * bool(path.fixed)]
-    of_series = f"Coefficients of order 0 of the series of a {kind}, except the coordinates, which are given"
+    of_series = f"Coefficients of order 0 in the series of a {kind}; those of the coordinates are given"
     of_order = "Coefficient k of the series, and coefficient k + 1 of the coordinates"
     at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
     return [

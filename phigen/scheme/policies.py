@@ -81,7 +81,7 @@ class PathPolicy(Policy):
     patience: int = count(3, "iterations before it is checked whether the approximate Jacobian is good enough")
     negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
     least_share: float = number(
-        1e-5, "terms in coordinate i are relative to its size + this fraction of the sum of all |x_j|"
+        1e-5, "terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|"
     )
     rounded_slope: float = number(2e-15, "rounding of the slope of a path, relative to the path and its slope")
     difference: float = number(
@@ -91,7 +91,7 @@ class PathPolicy(Policy):
     nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
     shrinking: float = number(0.25, "residuals below NEARLY_SOLVED are rounding if their ratio exceeds this")
     contracting: float = number(
-        0.05, "a Jacobian is useful if an iteration reduces the residual to less than this fraction"
+        0.05, "a Jacobian is useful if an iteration multiplies the residual by no more than this"
     )
 
 

@@ -113,7 +113,7 @@ LATTICE = (
         "!SERIES",
         (
             "int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */",
-            "size_t far; /* number of coming steps with functions for arguments of any size */",
+            "size_t far; /* number of next steps that use functions for arguments of any size */",
         ),
     ),
     StateBlock(
@@ -343,7 +343,7 @@ ROW = (
     StateBlock(
         "chosen",
         "BY_COLOUR",
-        ("int chosen;                   /* the colour that a part of H belongs to */",),
+        ("int chosen;                   /* the colour of the sites that a sweep updates */",),
         reset=("row.chosen = 0;",),
     ),
     StateBlock(

@@ -231,7 +231,7 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
-    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* transients may grow for as many sweeps as there are stages */
+    sweeps->rising = rate >= 1.0 ? sweeps->rising + 1 : 0; /* changes may grow at first, in transients, for as many sweeps as there are stages */
     return sweeps->rising < (int)PHI_NODES + PHI_MOST_RISING ? 0 : -1;
 }
 

@@ -28,8 +28,8 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 }
 
 #if PHI_MONITOR
-/* Indices of quantities that flows update, after the coordinates: the physical time, and a sum that becomes NaN outside the
-   domain of a logarithm. PHI_ALONG is the number of all. */
+/* Indices of the quantities that flows update besides the coordinates: the physical time, and a sum that becomes NaN
+   outside the domain of a logarithm. PHI_ALONG is the number of coordinates and these quantities together. */
 enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
 
 /* Make one step: the exact flows of the parts of the Hamiltonian K, one after the other. If it fails, the state is

@@ -177,7 +177,7 @@ export function collocate(solver, stage, start, history, increments) {
       history.sweeps = Math.max(2, early ? history.sweeps - 1 : sweep - 1);
       return "OK";
     }
-    rising = rate >= 1 ? rising + 1 : 0; // transients may grow for as many sweeps as there are stages
+    rising = rate >= 1 ? rising + 1 : 0; // changes may grow at first, for as many sweeps as stages
     if (rising >= NODES + MOST_RISING) return "NO_CONVERGENCE";
     last = change;
   }
