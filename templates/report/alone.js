@@ -1,4 +1,5 @@
-// A panel in a frame of another page: it sends its height to that page, and follows the theme of that page.
+// If the page of the panel is shown in a frame of another page: send the height of the panel to that page,
+// and follow its theme.
 if (parent !== window) {
   document.documentElement.classList.add("framed");
   new ResizeObserver(() => {

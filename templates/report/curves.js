@@ -1,7 +1,8 @@
-// Pictures of the live panel for ordinary systems: the motion in space or in a plane, on the surface or curve to which
-// a conserved quantity restricts it.
+// Pictures of the live panel for ordinary systems: the motion in space or in a plane, with the surface or
+// curve on which a conserved quantity keeps the motion.
 
-// The unit for errors of a quantity: the value at the start or, if this is nearly 0, the magnitude of the terms.
+// The unit for errors of a quantity: its value at the start, or the magnitude of its terms if the value is
+// nearly 0.
 function unitOf(quantity, x) {
   const value = Math.abs(quantity(x));
   let terms = 0;
@@ -13,13 +14,15 @@ function unitOf(quantity, x) {
   return value > 1e-3 * terms ? value : terms || 1;
 }
 
-// Coordinate i at the fraction s between two states, by the cubic polynomial with their slopes.
+// Coordinate i at the fraction s of the way between two states, by the cubic polynomial that has the values
+// and slopes of both states.
 function between(a, b, s, i) {
   const r = 1 - s;
   return r * r * (1 + 2 * s) * a.x[i] + r * r * s * a.slope[i] + s * s * (3 - 2 * s) * b.x[i] - s * s * r * b.slope[i];
 }
 
-// The lines f = 0 over a grid in a plane, as ends [u, v, u, v]. Sign changes of f at poles are left out.
+// The lines f = 0 over a grid in a plane, as short segments [u, v, u, v] between two points. Sign changes of
+// f at poles are left out.
 function contour(f, [u0, u1], [v0, v1], count) {
   const u = (i) => u0 + ((u1 - u0) * i) / count, v = (j) => v0 + ((v1 - v0) * j) / count;
   const values = Array.from({ length: count + 1 }, (_, i) => Array.from({ length: count + 1 }, (_, j) => f(u(i), v(j))));
@@ -46,8 +49,8 @@ function makeView(panel) {
   const spaces = sides.map((side) => inSpace(at(side), view, () => panel.draw(), reset));
   let bounds, net;
 
-  // A comparison (class Race) of a new solver with RK4, with the errors of conserved quantities. Throws an error of the
-  // solver if the solver refuses the settings.
+  // Return a comparison (class Race) of a new solver with RK4, which measures the errors of conserved
+  // quantities. If the solver refuses the settings, its error is thrown.
   function begin({ Solver, rateAt }, given) {
     const solver = new Solver({ x0: given.start, t0: data.t0, params: given.params });
     const field = (x, t) => {
@@ -73,7 +76,8 @@ function makeView(panel) {
     if (runner.trail.length > MOST) runner.trail.shift();
   }
 
-  // A trial run of some steps: the comparison with RK4, and the least and largest value of each coordinate of the solver.
+  // Make a trial run of some steps. Return the comparison with RK4, and for each coordinate the least and the
+  // largest value that the solver reached.
   function bounded(given, steps, milliseconds) {
     let low, high;
     const trial = tried(given, steps, milliseconds, ({ x }) => {
@@ -83,8 +87,9 @@ function makeView(panel) {
     return { trial, low, high };
   }
 
-  // A speed in steps per second at which the motion is easy to follow, with the largest distance between successive
-  // states and the length of the motion in a second, both relative to the size of the picture.
+  // Return a speed in steps per second at which the motion is easy to follow. Also return the largest
+  // distance between successive states, and the length of the motion in a second, both relative to the size
+  // of the picture.
   function pace(given) {
     const { trial, low, high } = bounded(given, 60, 100), { axes } = data.groups[0];
     const chords = trial.ours.trail.slice(1).map(({ x }, k) => {
@@ -95,8 +100,8 @@ function makeView(panel) {
     return { longest: Math.max(...chords), moved: chord * speed, speed };
   }
 
-  // Compute the box around the motion, and the surface or curve in it on which the motion stays: the level of a Casimir
-  // or of the energy.
+  // Compute the box around the motion. In this box, compute the surface or curve on which the motion stays:
+  // the level set of a Casimir or of the energy.
   function look() {
     const { settings, race } = panel, { low, high } = bounded(settings, 400, 60);
     const { axes, leaf } = data.groups[settings.group], { solver, start } = race;
@@ -118,7 +123,8 @@ function makeView(panel) {
     net = drawnOn(off, bounds);
   }
 
-  // The box around all zeros of a function in a box; null if they reach its sides.
+  // Return the box around all zeros of a function in a larger box; null if the zeros reach the sides of the
+  // larger box.
   function wholeIn(box, f) {
     const points = drawnOn(f, box).filter(Boolean);
     const inner = box.map((axis, k) => {
@@ -130,7 +136,8 @@ function makeView(panel) {
     return inner.every(Boolean) ? inner : null;
   }
 
-  // Lines of zeros of a function of two or three coordinates, as points, with null after each line.
+  // Return lines on which a function of two or three coordinates is zero: their points, with null after each
+  // line.
   function drawnOn(f, box) {
     const [u, v, w] = box.map(({ low, high }) => [low, high]), lines = [];
     if (!w) {
@@ -179,7 +186,8 @@ function makeView(panel) {
     write(end(v, v.high), left - 5, 10, "right", "top");
   }
 
-  // The trail of one method's run as points on the screen; of the last step, only the part that was shown so far.
+  // Return the trail of one method's run as points on the screen. Of the last step, only the part is drawn
+  // that has been shown so far.
   function trailOf(runner, axes, place) {
     const points = [], { trail } = runner, { waiting } = panel, parts = 6;
     for (let k = 1; k < trail.length; k++) {

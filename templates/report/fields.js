@@ -1,6 +1,6 @@
 // Pictures of the live panel for lattices: fields over space and time, in a plane or on a graph, or moving sites.
 
-// A generator of random numbers from 0 to 1, the same for the same seed.
+// Return a generator of random numbers from 0 to 1. Equal seeds give equal numbers.
 function randomNumbers(seed) {
   let state = seed >>> 0;
   return () => {
@@ -11,8 +11,8 @@ function randomNumbers(seed) {
   };
 }
 
-// The values of a field or parameter from their description in a spec: a number, a list, random values, or a formula of
-// the indices and the sizes.
+// Return the values of a field or parameter. `given` describes them as in a spec: by a number, a list, random
+// values, or a formula that depends on the indices and the sizes.
 function valuesOf(given, name, sizes, length) {
   if (given.number !== undefined) return new Float64Array(length).fill(given.number);
   if (given.listed) return Float64Array.from(given.listed);
@@ -25,7 +25,8 @@ function valuesOf(given, name, sizes, length) {
   return Float64Array.from({ length }, (_, site) => liveValues[name](...places(site), ...sizes));
 }
 
-// The initial fields, each with the values of all sites, one field after the other.
+// Return the initial values of all fields: first those of the first field at all sites, then those of the
+// next field, and so on.
 function startOf(data, sizes, count) {
   const whole = data.initial[""], fields = data.coordinates.length;
   if (!whole) return Float64Array.from(data.coordinates.flatMap((name) => [...valuesOf(data.initial[name], name, sizes, count)]));
@@ -35,7 +36,8 @@ function startOf(data, sizes, count) {
   return drawn.map((v, k) => (whole.scale * v) / length(k % count));
 }
 
-// Colours for values from 0 to 1. LIGHT and DARK are for values of both signs: the middle is the colour of the page.
+// Colours for values from 0 to 1. For values of both signs, LIGHT and DARK are used on light and on dark
+// pages; their middle is the colour of the page.
 const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const LIGHT = [[5, 70, 140], [94, 160, 205], [246, 247, 248], [235, 130, 90], [150, 12, 30]];
 const DARK = [[130, 205, 255], [35, 110, 170], [28, 34, 41], [190, 85, 45], [255, 200, 150]];
@@ -51,7 +53,7 @@ function directed(x, y, z) {
   return [0, 1, 2].map((k) => 255 * (light + depth * Math.cos(angle - (2 * Math.PI * k) / 3)));
 }
 
-const COLUMNS = 240; // largest number of columns of a diagram; if there are more, every second one is removed
+const COLUMNS = 240; // a diagram with more columns than this loses every second one
 const BEHIND = 60; // number of steps in the trails of moving sites
 
 function makeView(panel) {
@@ -60,8 +62,8 @@ function makeView(panel) {
   const countOf = (sizes) => sizes.reduce((product, n) => product * n, 1);
   let low, high, table, ground;
 
-  // A comparison (class Race) of a new solver with RK4, with the errors of conserved quantities. Throws an error of the
-  // solver if the solver refuses the settings.
+  // Return a comparison (class Race) of a new solver with RK4, which measures the errors of conserved
+  // quantities. If the solver refuses the settings, its error is thrown.
   function begin({ Solver }, given) {
     const sizes = sizesOf(given), count = countOf(sizes), params = { ...given.params };
     for (const [name, values] of Object.entries(data.arrays)) {
@@ -73,16 +75,17 @@ function makeView(panel) {
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
-  // A function that returns the energy error, relative to |H| at the start or, if |H| is nearly 0, to the sum of the
-  // magnitudes of the energies of all sites.
+  // Return a function that computes the energy error. The error is relative to |H| at the start. If |H| is
+  // nearly 0, it is relative to the sum of the magnitudes of the energies of all sites.
   function energyError(solver) {
     const energy = solver.hamiltonian(), sites = solver.density().reduce((sum, v) => sum + Math.abs(v), 0);
     const unit = (Math.abs(energy) > 1e-3 * sites ? Math.abs(energy) : sites) || 1;
     return (x) => Math.abs(solver.hamiltonian(x) - energy) / unit;
   }
 
-  // A function that returns the largest error of some Casimirs. For Casimirs of sites this is the error of the worst
-  // site; for Casimirs that are sums, errors are relative to the magnitudes of the terms.
+  // Return a function that computes the largest error of some Casimirs. If each site has a Casimir, this is
+  // the error at the worst site. If a Casimir is a sum over the sites, its error is relative to the
+  // magnitudes of the terms.
   function offCasimirs(solver, chosen) {
     const first = solver.casimirs(), { count } = solver.sites, kinds = solver.constructor.CASIMIR_KINDS;
     const units = kinds.map((_, k) => first.subarray(k * count, (k + 1) * count).reduce((sum, v) => sum + Math.abs(v), 0) || 1);
@@ -101,8 +104,8 @@ function makeView(panel) {
     };
   }
 
-  // A function that returns the largest error of some invariants. Each invariant is an observable of the solver, and the
-  // observable after it is the sum of the magnitudes of its terms.
+  // Return a function that computes the largest error of some invariants. Each invariant is an observable of
+  // the solver. The observable that follows it is the sum of the magnitudes of its terms.
   function offInvariants(solver, chosen) {
     const first = Float64Array.from(solver.observables());
     const unit = (k) => (Math.abs(first[k]) > 1e-3 * first[k + 1] ? Math.abs(first[k]) : first[k + 1]) || 1;
@@ -115,8 +118,9 @@ function makeView(panel) {
 
   // -- stored values of states
 
-  // The values to draw: those of the chosen field, the three fields of a direction, or the places of moving sites. On
-  // three axes, only the plane in the middle of the first axis is drawn.
+  // Return the values to draw: those of the chosen field, of the three fields that form a direction, or the
+  // positions of moving sites. If a lattice has three axes, only the plane in the middle of the first axis is
+  // drawn.
   function shown({ x, t }, solver, { kind, fields }, sizes) {
     const count = countOf(sizes), plane = sizes.length > 2 ? sizes[1] * sizes[2] : count;
     const from = sizes.length > 2 ? plane * Math.floor(sizes[0] / 2) : 0;
@@ -126,7 +130,8 @@ function makeView(panel) {
     return kept;
   }
 
-  // Store the values to draw: columns of a diagram, trails of moving sites, or the last two states.
+  // Store the values to draw. A diagram needs its columns, moving sites need their trails, and other pictures
+  // need the last two states.
   function remember(runner, solver, chosen, sizes) {
     const kept = (runner.kept ??= { list: [], stride: 1, since: 0 });
     if (++kept.since < kept.stride) return;
@@ -141,8 +146,8 @@ function makeView(panel) {
 
   // -- choice of speed and colours
 
-  // A trial run of some steps: the comparison with RK4, the least and largest value to draw, and the change in each step
-  // relative to the range of the values.
+  // Make a trial run of some steps. Return the comparison with RK4, the least and the largest value to draw,
+  // and the change of the values in each step, relative to their range.
   function surveyed(given, steps, milliseconds) {
     const chosen = data.groups[given.group], sizes = sizesOf(given), changes = [];
     let last, least = Infinity, most = -Infinity;
@@ -174,7 +179,7 @@ function makeView(panel) {
     table = null;
   }
 
-  // Extend the range of the colours if values of the solver are outside.
+  // Extend the range of the colours if values of the solver are outside of it.
   function widen(values) {
     const reach = 0.1 * (high - low), both = low < 0 && high > 0;
     let least = low, most = high;
@@ -184,8 +189,8 @@ function makeView(panel) {
     table = null;
   }
 
-  // Settings for the search of the initial step. Planes and cubes get fewer sites, whose motion is similar, so that the
-  // search is fast.
+  // Return the settings for the search for the initial step. Planes and cubes get fewer sites: their motion
+  // is similar, and the search is fast.
   function rehearsed(given) {
     const counts = data.sizes.map(countOf), few = counts.findLastIndex((count) => count <= 600);
     return data.picture === "plane" && few >= 0 ? { ...given, sites: Math.min(few, given.sites) } : given;
@@ -205,7 +210,7 @@ function makeView(panel) {
     return table;
   }
 
-  // Set the colours of pixels by the values of sites; the pixel of a site has the index place(site).
+  // Set the colours of pixels by the values of the sites. place(site) is the index of the pixel of a site.
   function paint(pixels, values, place, all, direction) {
     const count = direction ? values.length / 3 : values.length;
     for (let site = 0; site < count; site++) {
@@ -218,8 +223,8 @@ function makeView(panel) {
     }
   }
 
-  // The picture of the run of one method. A diagram is reused while colours and stride are the same, so that only new
-  // columns are painted.
+  // Return the picture of the run of one method. The picture of a diagram is used again as long as colours
+  // and stride are unchanged, so that only new columns are painted.
   function pictureOf(runner, width, height, all) {
     const { kept } = runner;
     const fresh = runner.picture?.all === all && runner.picture.stride === kept.stride && data.picture === "diagram";
@@ -232,7 +237,8 @@ function makeView(panel) {
     return runner.picture;
   }
 
-  // Clear the canvas of one method, and return the rectangle of the picture, without axis names and the colour scale.
+  // Clear the canvas of one method. Return the rectangle that remains for the picture beside the axis names
+  // and the colour scale.
   function frame(k) {
     const canvas = at(sides[k]), pen = canvas.getContext("2d"), scale = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale;
@@ -312,7 +318,8 @@ function makeView(panel) {
     scaleOf(space, all);
   }
 
-  // Draw moving sites with their trails. Sites with a negative value of the parameter data.sign are rings.
+  // Draw moving sites with their trails. Sites at which the parameter data.sign is negative are drawn as
+  // rings.
   function drawMoving(space, runner, k) {
     const { pen, left, top, width, height } = space, { list } = runner.kept, count = list[0].length / 2;
     const side = Math.min(width, height), x0 = left + (width - side) / 2, unit = side / (high - low);
@@ -352,7 +359,7 @@ function makeView(panel) {
     named(space, group().fields.map((f) => ({ name: data.coordinates[f], ...ends })), x0, top, side, side);
   }
 
-  // Draw the sites of a graph with their bonds. The size of sites depends on their number.
+  // Draw the sites of a graph with their bonds. The more sites there are, the smaller they are drawn.
   function drawGraph(space, runner) {
     const { canvas, pen, left, top, width, height } = space, all = colours(canvas), values = runner.kept.list.at(-1);
     const count = data.places.length / 2, direction = group().kind === "direction", pixels = new Float64Array(4 * count);

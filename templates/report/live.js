@@ -1,4 +1,5 @@
-// The live panel: the solver of this page and RK4 run side by side, with the errors of conserved quantities.
+// The live panel: the solver of this page and RK4 run side by side, and the errors of conserved quantities
+// are shown.
 if (document.getElementById("live-panel")) {
   const at = (id) => document.getElementById(`live-${id}`);
   const data = JSON.parse(at("data").textContent);
@@ -9,7 +10,7 @@ if (document.getElementById("live-panel")) {
   const made = {};
   const solverOf = (order) => (made[order] ??= liveSolvers[order]());
   const ahead = 100; // number of steps for each click, if the reader's system requests reduced motion
-  // The values of sliders that select from a list.
+  // The lists from which some sliders select a value.
   const lists = { order: data.orders, sites: (data.sizes ?? []).map((_, k) => k) };
   let settings, standard, race, changed = false, playing = false, waiting = 1, before = 0, seen = true;
 
@@ -18,7 +19,7 @@ if (document.getElementById("live-panel")) {
   const shortened = (value) => Number(value.toPrecision(4));
   const copy = (given) => ({ ...given, params: { ...given.params }, start: [...given.start] });
 
-  // The setting for the kind and the name of a slider.
+  // The setting that a slider with this kind and name changes.
   const get = (from, kind, name) => (kind === "params" ? from.params[name] : kind === "start" ? from.start[name] : from[kind]);
   function set(into, kind, name, value) {
     if (kind === "params") into.params[name] = value;
@@ -26,8 +27,8 @@ if (document.getElementById("live-panel")) {
     else into[kind] = value;
   }
 
-  // The value of a slider with positions from -100 to 100. The position is the exponent of a factor, or is proportional
-  // to a difference from the usual value.
+  // The value that a slider sets. Its positions go from -100 to 100. Depending on its scale, the position is
+  // the exponent of a factor, or it is proportional to the difference from the usual value.
   function valueOf(input) {
     const { kind, name, reach } = input.dataset, place = Number(input.value) / 100, usual = get(standard, kind, name);
     if (lists[kind]) return lists[kind][Number(input.value)];
@@ -98,7 +99,8 @@ if (document.getElementById("live-panel")) {
       const allowed = only ? positive : nonnegative ? (v) => v >= 0 : () => true;
       number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
-    // A link contains the number of steps of RK4 for one step of the solver, so that it shows what its sender saw.
+    // A link contains the number of steps of RK4 for each step of the solver, so that its reader sees what
+    // its sender saw.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return { found, refused: [...refused, ...[...unknown].map((key) => `${key}=${parts.get(key)}`)] };
@@ -137,7 +139,7 @@ if (document.getElementById("live-panel")) {
   const ink = () => getComputedStyle(at("panel")).color;
   const colour = (k) => getComputedStyle(swatches[k]).color;
 
-  // The pictures, by curves.js for ordinary systems and by fields.js for lattices.
+  // The pictures: curves.js draws them for ordinary systems, and fields.js for lattices.
   const view = makeView({
     at, data, sides, ink, colour, begin, shortened, draw, solverOf, restart,
     tried: (...given) => start.tried(...given),
@@ -310,7 +312,7 @@ if (document.getElementById("live-panel")) {
     if (at("group")) at("group").value = settings.group;
     restart();
     at("unused").hidden = !refused.length;
-    at("unused").textContent = `Not used from the address, as unknown or not allowed: ${clipped(refused.join(", "))}`;
+    at("unused").textContent = `Parts of the address that are unknown or not allowed, and were ignored: ${clipped(refused.join(", "))}`;
   }
   addEventListener("hashchange", follow);
   still.addEventListener("change", rest);

@@ -1,13 +1,14 @@
-// Comparison of the solver of phigen with RK4, from the same start, with one or several steps of RK4 for each step of
-// the solver. For both, the errors of conserved quantities are measured.
-const MOST = 400; // largest number of intervals in a history, and of steps in a trail
+// Comparison of the solver of phigen with RK4. Both start at the same state, and RK4 makes one or several
+// steps for each step of the solver. The errors of conserved quantities are measured for both.
+const MOST = 400; // largest number of intervals in a History, and of steps in a trail
 const MOST_PARTS = 64; // largest number of steps of RK4 for one step of the solver
-const ROUNDING = 1e-13; // smaller errors are rounding errors, and not compared
-// Ratio of the largest errors in the second and in the first half of a run: errors are constant if it is at most STEADY,
-// and grow if it is more than GROWING.
+const ROUNDING = 1e-13; // errors below this are rounding errors, which are not compared
+// The ratio of the largest error in the second half of a run to that in the first: an error is constant if
+// the ratio is at most STEADY, and grows if it is more than GROWING.
 const STEADY = 1.2, GROWING = 1.5;
 
-// The largest error in each of several equal intervals of a run. If there are too many intervals, pairs are joined.
+// The largest error in each of several equal intervals of a run. If there are too many intervals, every two
+// of them are joined.
 class History {
   values = [];
   last = 0;
@@ -44,11 +45,11 @@ function rk4(field, x, t, h) {
   return { x: sum.map((total, i) => x[i] + (h * total) / 6), t: t + (h * time) / 6 };
 }
 
-// The run of one method: its state, its errors, and the reason if it has failed.
+// The run of one method: its state, its errors, and the reason if the method has failed.
 class Runner {
   failed = "";
   steps = 0;
-  // The largest errors of each group of quantities.
+  // One History for each group of quantities.
   histories;
 
   constructor(race, advance) {
@@ -73,8 +74,9 @@ class Runner {
   }
 }
 
-// The runs of both methods, from the state of a solver. RK4 makes `parts` steps for each step of the solver. The errors
-// of the groups {name, error(x, t)} are stored, and remember(runner) is called at the start and after each step.
+// The runs of both methods, which start at the state of `solver`. RK4 makes `parts` steps for each step of
+// the solver. The errors of the groups {name, error(x, t)} are stored, and remember(runner) is called at the
+// start and after each step.
 class Race {
   constructor(solver, { h, parts = 1, field, groups, remember }) {
     Object.assign(this, { solver, h, field, groups, remember, start: Float64Array.from(solver.x), t0: solver.t });
@@ -93,7 +95,8 @@ class Race {
   }
 }
 
-// The time of one step of one method in milliseconds, the shortest of several rounds; 0 if the step fails.
+// The time in milliseconds that one step of one method takes: the shortest of several measurements, each of
+// which takes `round` milliseconds; 0 if the step fails.
 function millisecondsOf(runner, round) {
   let least = Infinity;
   try {
@@ -113,7 +116,7 @@ function millisecondsOf(runner, round) {
   return least;
 }
 
-// The number of steps of RK4 that take as long as one step of the solver, rounded up in favour of RK4.
+// The number of steps of RK4 that take as long as one step of the solver, rounded up, which favours RK4.
 function equalWork(race, round = 4) {
   const [ours, theirs] = [race.ours, race.theirs].map((runner) => millisecondsOf(runner, round));
   return ours > 0 && theirs > 0 ? Math.min(MOST_PARTS, Math.max(1, Math.ceil(ours / theirs))) : 1;
@@ -125,14 +128,15 @@ function halves(history) {
   return [values.slice(0, middle), values.slice(middle)].map((part) => Math.max(0, ...part));
 }
 
-// The groups {name, ours, theirs} in which RK4 has smaller errors, with the errors of both methods in both halves.
+// The groups of quantities in which RK4 has smaller errors. `ours` and `theirs` are the errors of phigen and
+// of RK4 in the first and in the second half of the run.
 function groupsOfRk4({ ours, theirs, groups }) {
   if (theirs.failed) return [];
   const errors = groups.map(({ name }, k) => ({ name, ours: halves(ours.histories[k]), theirs: halves(theirs.histories[k]) }));
   return errors.filter((of) => of.theirs[1] < of.ours[1] && of.ours[1] >= ROUNDING);
 }
 
-// A text about the groups in which RK4 has smaller errors; "" if there are none.
+// A text for the reader about the groups of quantities in which RK4 has smaller errors; "" if there are none.
 function whereRk4IsCloser(race) {
   const sentences = groupsOfRk4(race).map(({ name, ours: [first, last], theirs: [begin, end] }) => {
     const crossing = last <= STEADY * first && end > GROWING * begin;

@@ -1,8 +1,8 @@
-// Drawing of points in space on a canvas, with a view that mouse, touch and keys turn, for the live panel and the
-// viewer.
+// Drawing of points in space on a canvas, for the live panel and for the viewer. Mouse, touch and keys turn
+// the view.
 const rounded = (number, digits) => number.toFixed(digits).replace(/^-(0\.?0*)$/, "$1").replace("-", "−");
 
-// The number of digits after the point that distinguishes numbers between two bounds.
+// The number of digits after the point with which numbers between two bounds can be distinguished.
 const digitsBetween = (low, high) => Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(high - low || 1))));
 
 function inSpace(canvas, view, redraw, reset) {
@@ -75,7 +75,8 @@ function inSpace(canvas, view, redraw, reset) {
     });
   }
 
-  // Draw points on the screen, as a line if `joined`. A line is interrupted at null, and is paler in the back.
+  // Draw points on the screen, as a line if `joined`, else as dots. A null in the list interrupts the line.
+  // Parts in the back are paler.
   function curve(points, colour, width, [faint, full], joined) {
     pen.strokeStyle = pen.fillStyle = colour;
     pen.lineWidth = width;
@@ -132,8 +133,8 @@ function inSpace(canvas, view, redraw, reset) {
   return { pen, begin, placed, box, curve, turn };
 }
 
-// The middles of axes {low, high}, the half-lengths by which they are scaled, and their half-lengths after scaling
-// (`reach`). Axes of similar lengths have one scale.
+// For axes {low, high}: their middles, the half-lengths by which they are scaled, and their half-lengths
+// after scaling (`reach`). Axes of similar lengths have the same scale.
 function framed(axes) {
   const spans = axes.map(({ low, high }) => high - low);
   const largest = Math.max(...spans), shared = spans.every((s) => 4 * s > largest);

@@ -1,25 +1,26 @@
-// The settings with which the live panel starts: order, step and speed at which the difference of the methods is
-// visible.
-const SHOWN = 10; // seconds of the motion after which the methods are compared
+// The settings with which the live panel starts: the order, the step and the speed at which the difference
+// between the two methods is visible.
+const SHOWN = 10; // seconds of motion after which the methods are compared
 const TRIED = 1200; // largest number of steps in a trial run
-const MILLISECONDS = { ours: 200, all: 2400 }; // largest durations of a trial, and of all trials
-const VISIBLE = 3e-3, FAR = 0.3; // smaller errors than VISIBLE cannot be seen, and all larger ones than FAR look alike
+const MILLISECONDS = { ours: 200, all: 2400 }; // longest time for one trial run, and for all of them
+const VISIBLE = 3e-3, FAR = 0.3; // errors below VISIBLE cannot be seen; errors above FAR all look alike
 const MARGIN = 0.03; // largest error of phigen's solver with the initial settings
 const CHORD = 0.8; // largest distance between successive states, relative to the size of the picture
-const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if some step allows it
-const DOUBLED = 14; // largest number of steps that are tried; each is twice the one before
-const BETTER = 1.2, CLEAR = 4; // factor by which the score of a new setting must be larger; score that ends the search
+const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if possible
+const DOUBLED = 14; // largest number of step sizes to try; each is twice the previous one
+const BETTER = 1.2, CLEAR = 4; // best scores must grow by the factor BETTER; the search ends above CLEAR
 
 function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, costOf = (race) => equalWork(race, 1) }) {
-  // The number of steps of RK4 for one step of the solver: one, or as many as take the same time in this browser. This
-  // is measured once for each order and size and for similar steps, so that it does not change while a slider moves.
+  // The number of steps of RK4 for each step of the solver: one, or the number that takes the same time in
+  // this browser. The time is measured once for each order and size and for similar steps, so that the number
+  // does not change while a slider moves.
   const measured = {};
   const alike = ({ order, sites, h }) => [order, sites, Math.round(2 * Math.log2(Math.abs(h)))].join();
   const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= costOf(begin({ ...given, parts: 1 }))));
   const remember = (given, parts) => { measured[alike(given)] = parts; };
 
-  // The comparison with RK4 after the given number of steps, or after as many as `limit` milliseconds allow.
-  // watch(runner) is called for each state of phigen's solver.
+  // The comparison with RK4 after `steps` steps, or after fewer steps if these take longer than `limit`
+  // milliseconds. watch(runner) is called for each state of phigen's solver.
   function tried(given, steps, limit, watch = () => {}) {
     const trial = begin(given), { ours } = trial, end = performance.now() + limit;
     watch(ours);
@@ -32,21 +33,23 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
 
   const worst = ({ failed, histories }) => (failed ? Infinity : Math.max(0, ...histories.map((history) => Math.max(...halves(history)))));
 
-  // Whether the solver still works with twice the step.
+  // Whether the errors of the solver are still small with twice the step.
   const hasMargin = (given) => worst(tried({ ...given, h: 2 * given.h }, 100, 60).ours) < 0.5;
 
-  // A score for the visible advantage of the solver: the share of the groups in which RK4 does not have smaller errors,
-  // plus the ratio of the largest errors of RK4 and of the solver, limited to visible errors. This second term is
-  // negative if the errors of RK4 are smaller.
+  // A score for the visible advantage of the solver over RK4: a sum of two terms. The first is the share of
+  // the groups of quantities in which RK4 does not have smaller errors. The second is the ratio of the
+  // largest error of RK4 to that of the solver, where only visible differences count; it is negative if RK4
+  // has smaller errors.
   function advantage(race) {
     const [ours, theirs] = [worst(race.ours), worst(race.theirs)], closer = groupsOfRk4(race).length;
     const seen = theirs > ours ? Math.min(theirs, FAR) / Math.max(ours, VISIBLE) : -Math.min(1, ours / MARGIN) / 2;
     return 1 - closer / race.groups.length + seen;
   }
 
-  // Settings of an order for which the errors of the solver are small, even with twice the step. The steps are that of
-  // the run, or less if necessary, and its multiples by 2, 4, 8, … up to the first at which RK4 fails. There is at
-  // least one setting.
+  // Settings of one order with which the errors of the solver are small, even with twice the step. The first
+  // step is that of the run, or a fraction of it if necessary. Each further step is twice the previous one.
+  // The last is the first with which RK4 fails, or the last with which the solver is accurate and the motion
+  // can be followed. There is at least one setting.
   function stepsOf(given, end) {
     let h = data.step;
     const at = (step) => ({ ...given, h: step }), steps = [];
@@ -62,7 +65,8 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
     return steps;
   }
 
-  // The setting of an order with the highest score. Large steps are tried first, since RK4 fails with them.
+  // The setting of one order that has the highest score. Large steps are tried first, since RK4 fails with
+  // large steps.
   function settingOf(given, end) {
     const [first, ...larger] = stepsOf(given, end);
     let best = { ...first, score: 0 };
@@ -76,7 +80,8 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
     return best;
   }
 
-  // The initial order, step and speed. If the order of the page shows no clear advantage, other orders are tried.
+  // The initial order, step and speed. Other orders are tried if the order of the page shows no clear
+  // advantage.
   function showing(standard) {
     const given = view.rehearsed({ ...standard, parts: 1 }), begun = performance.now();
     if (!data.quantities.length) return { order: data.order, h: data.step, speed: view.pace(given).speed };

@@ -1,5 +1,6 @@
 "use strict";
-// The page has the theme of the system, light or dark, until the button switches to the other one.
+// The page follows the theme of the system, light or dark, until the reader presses the button, which
+// switches to the other theme.
 {
   const root = document.documentElement;
   const button = document.getElementById("theme");

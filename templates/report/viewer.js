@@ -10,12 +10,14 @@ if (document.getElementById("viewer")) {
   const space = inSpace(canvas, view, draw, reset), pen = space.pen;
   let turning = false;
 
-  // Numbers are stored as integers from 0 to data.steps. value is column `axis` of curve `c` at row `i`.
+  // Numbers are stored as integers from 0 to data.steps. value(c, axis, i) is the number of curve `c` in
+  // column `axis` and row `i`.
   const scaled = (axis, i) => data.low[axis] + ((data.high[axis] - data.low[axis]) * i) / data.steps;
   const value = (c, axis, i) => scaled(axis, data.curves[c][axis][i]);
   const axes = () => selects.map((s) => Number(s.value));
 
-  // The row of curve `c` at the time of row `row` of the first curve. Curves may have rows at different times.
+  // Return the row of curve `c` that has the time of row `row` of the first curve, or the next row if no row
+  // has this time.
   function sameTime(c, row) {
     const times = data.curves[c].at(-1), i = times.findIndex((t) => t >= data.curves[0].at(-1)[row]);
     return i < 0 ? times.length - 1 : i;
@@ -50,7 +52,8 @@ if (document.getElementById("viewer")) {
     canvas.dataset.view = [view.yaw, view.pitch, view.zoom].map((v) => v.toFixed(3)).join(" ");
     const shown = data.names.map((n, a) => `${n} = ${rounded(value(0, a, row), digitsBetween(data.low[a], data.high[a]))}`);
     const told = shown.slice(0, 13).join(", ") + (shown.length > 13 ? ", …" : "");
-    // Screen readers speak the text whenever it is set, even to the same value.
+    // Screen readers speak the text whenever it is set, even if it does not change. So set it only if it
+    // changes.
     if (element("viewer-state").textContent !== told) element("viewer-state").textContent = told;
   }
 
