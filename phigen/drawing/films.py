@@ -20,10 +20,9 @@ MOST_PICTURES, RATE, DOTS = 400, 20, 80
 
 @styled
 def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> None:
-    """Write a film of all coordinates to a ``.gif`` or ``.mp4`` file; the text ``origin`` becomes a comment in the
-    file.
+    """Write a film of all coordinates to a ``.gif`` or ``.mp4`` file.
 
-    Raises `MissingPackageError` if ffmpeg is needed and missing.
+    The text ``origin`` becomes a comment in the file. Raises `MissingPackageError` if ffmpeg is needed and missing.
     """
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure

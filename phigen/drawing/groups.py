@@ -67,8 +67,8 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 def _parts(run: Group) -> list[Group]:
     """Return the groups of two or three names into which a long group is split.
 
-    The groups have three names if the long group begins with x, y, z or if its length is divisible by 3; otherwise they
-    have two. If the length is odd then, the first group has three names.
+    The groups have three names if the long group begins with x, y, z or if its length is divisible by 3. Otherwise they
+    have two names, but the first group has three if the length is odd.
     """
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]

@@ -28,7 +28,7 @@ class Leaf:
     level: float
 
     def value_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return C − level at points (…, 3), shape (…), and ∇C, shape (…, 3)."""
+        """Return the values of C − level (…) and of ∇C (…, 3) at points (…, 3)."""
         values = {**self.parameters, **{name: points[..., i] for i, name in enumerate(self.names)}}
         arrays = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
         value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in arrays)

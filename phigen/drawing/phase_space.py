@@ -33,7 +33,7 @@ LONG = 60.0
 #: drawn in BANDS parts by distance from the viewer; the farther parts are paler.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
-#: Fraction of a small panel that a box in space fills.
+#: Zoom of a box in space in a small panel; in large panels the zoom is larger.
 SMALL = 0.76
 
 
@@ -75,7 +75,7 @@ def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mappin
 
 
 def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
-    """Draw a curve (rows, 2) and its first point."""
+    """Draw a curve (rows, 2) with a dot at its first point."""
     axes.set_xlabel(names[0], labelpad=2)
     axes.set_ylabel(names[1], labelpad=2)
     axes.grid(True)
@@ -85,7 +85,10 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 
 
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
-    """Draw a curve (rows, 3), paler towards the back, with the net of its leaf and its first point."""
+    """Draw a curve (rows, 3) with a dot at its first point, and the net of its leaf.
+
+    The net, and a curve that is not long, are paler towards the back.
+    """
     box = around(leaf, box_of(points)) if leaf else box_of(points)
     # All axes have the same scale, unless a coordinate would become too flat.
     size = box[1] - box[0]

@@ -47,7 +47,9 @@ class Approach:
     exact: Floats
 
     def errors(self, label: str) -> Floats:
-        """Return the errors (rows,) of a solution, relative to its largest coordinate."""
+        """Return the errors (rows,) of the states of one method, relative to the largest coordinate of the
+        exact state.
+        """
         distance = np.max(np.abs(self.trajectories[label].x - self.exact), axis=1)
         errors: Floats = distance / np.max(np.abs(self.exact), axis=1)
         return errors

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """Measured number, and what the paper says about it, in other words than those of the paper."""
+    """Measured number, and a paraphrase of what the paper says about it."""
 
     quantity: str
     paper: str
@@ -51,7 +51,9 @@ def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[C
 
 
 def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Mapping[str, float]) -> Trajectory:
-    """Return states (rows, DIM) of a classical method at times (rows,) as a trajectory with energy and Casimirs."""
+    """Return a trajectory with energies and Casimirs, from states (rows, DIM) of a classical method at times
+    (rows,).
+    """
     backend, names = solver.backend, solver.interface
     energy, values = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)
     casimirs = {name: values[:, i] for i, name in enumerate(names.casimirs)}

@@ -17,9 +17,11 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass
 class ClassicalCourse:
-    """Run of a classical method that is continued step by step, with the interface of `phigen.runtime.session.Course`.
+    """Run of a classical method that is continued step by step, with the interface of
+    `phigen.runtime.session.Course`.
 
-    The compiled ``runner`` reads its initial state from the array ``place``. ``x`` is the state after ``steps`` steps.
+    The compiled function ``runner`` makes the steps. It reads its initial state from the array ``place``. ``x`` is the
+    state after ``steps`` steps.
     """
 
     runner: race.Runner
@@ -46,6 +48,9 @@ class ClassicalCourse:
 
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
-    """Return a run of a method that starts at x0 (DIM,). Raises `ToolchainError` without a C compiler."""
+    """Return a run by the classical method ``method``, which starts at x0 (DIM,).
+
+    Raises `ToolchainError` without a C compiler.
+    """
     state = np.array(x0, dtype=np.float64)
     return ClassicalCourse(race.compiled(compilation, [method], state, parameters).runners[method], state, state.copy())

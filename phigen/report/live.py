@@ -118,7 +118,9 @@ def solvers(
 
 
 def emits(compilation: Compilation) -> bool:
-    """Return whether the panel can run the program of the page unchanged."""
+    """Return whether the panel can run the solver of the page as it is. Otherwise the panel needs a compilation of its
+    own.
+    """
     extras = replace(compilation.program.extras, included=frozenset())
     return not compilation.spec.reconstruct and extras in (NO_EXTRAS, _PRIVATE)
 

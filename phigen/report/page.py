@@ -96,7 +96,10 @@ def equations(listed: Sequence[Sequence[str]]) -> Markup:
 
 
 def data(identifier: str, value: Any) -> Markup:
-    """Return a data element for a script, as JSON that cannot end the element."""
+    """Return an HTML element that contains data for a script.
+
+    The data are JSON, written so that no text in them can close the element.
+    """
     return block("data", identifier=identifier, value=htmlsafe_json_dumps(value, dumps=_compact))
 
 
@@ -134,7 +137,7 @@ def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
 
 
 def with_origin(html: str, origin: str) -> str:
-    """Return the page with its origin (version and command) in its metadata."""
+    """Return the page with the text ``origin`` (version and command) in its metadata."""
     generator = '<meta name="generator"'
     return html.replace(generator, f'<meta name="source" content="{escape(origin)}">\n{generator}', 1)
 
