@@ -41,7 +41,9 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """Group of commands that are imported on first use. Errors of a command become messages and exit codes."""
+    """Group of commands. The module of a command is imported when the command is used; its exceptions become messages
+    and exit codes.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

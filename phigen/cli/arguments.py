@@ -19,18 +19,18 @@ FIGURES = (".png", ".svg", ".pdf")
 #: Suffixes of films, which only lattices have.
 FILMS = (".gif", ".mp4")
 
-#: The type of ``--order``.
+#: The orders that ``--order`` accepts.
 ORDER = click.IntRange(1, limits.ORDER)
 
-#: The type of ``--modified``.
+#: The numbers of corrections that ``--modified`` accepts.
 CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
 
 order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method; overrides the spec.")
 
-#: The type of ``--seed``, which selects the random numbers of a run with noise.
+#: The seeds that ``--seed`` accepts. A seed selects the random numbers of a run with noise.
 SEED = click.IntRange(0, limits.SEED)
 
-#: The option for the target whose solver runs; auto takes C, or NumPy if there is no C compiler.
+#: The option for the target whose solver is run. The value auto stands for C, or for NumPy if there is no C compiler.
 target_option = click.option(
     "-t",
     "--target",

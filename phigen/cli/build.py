@@ -45,7 +45,7 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
     "platforms",
     multiple=True,
     type=click.Choice(list(PLATFORMS)),
-    help="With --fmu: a binary for this platform only, instead of one for each; may be repeated.",
+    help="With --fmu: compile for this platform only, not for all platforms; may be repeated.",
 )
 @click.option(
     "--binding",

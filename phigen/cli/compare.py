@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--orders", metavar="N,…", default="2,4", show_default=True, help="Orders of the methods.")
 @click.option(
     "--equal", type=click.Choice(["step", "work"]), default="step", show_default=True,
-    help="Compare at the step of the run, or at the CPU time of the spec's setting with that step.",
+    help="Give all methods the step of the run, or the CPU time that the setting of the spec needs with this step.",
 )  # fmt: skip
 @click.option("--horizon", type=float, metavar="T", help="Length of the run in time.  [default: as in the spec]")
 @settings_option
@@ -116,12 +116,10 @@ def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
     rows += [_row(entry) for entry in comparison.entries if not entry.refusal]
     for line in table(rows, right=range(1, 8)):
         out(f"  {line}")
+    out(f"\n  * the setting of the spec. Energy errors are {comparison.unit}; orbit errors are distances from an orbit")
     out(
-        f"\n  * the setting of the spec. Energy errors are {comparison.unit}; "
-        "the orbit error is relative to the largest"
-    )
-    out(
-        "  coordinate, where DOP853 with small steps knows the orbit. The Poisson defect is relative to |DΦ| |π| |DΦ|ᵀ."
+        "  by DOP853 with small steps, relative to its largest coordinate. The Poisson defect is relative to "
+        "|DΦ| |π| |DΦ|ᵀ."
     )
     refused = [entry for entry in comparison.entries if entry.refusal]
     for reason in dict.fromkeys(entry.refusal for entry in refused):

@@ -186,7 +186,10 @@ def _stdout() -> Iterator[None]:
 
 
 def _colour() -> bool | None:
-    """Whether to use colour: False if NO_COLOR is set (https://no-color.org); None lets click decide by the stream."""
+    """Whether to use colour: False if NO_COLOR is set (https://no-color.org), else None.
+
+    None means that click decides: it uses colour on terminals only.
+    """
     return False if os.environ.get("NO_COLOR") else None
 
 

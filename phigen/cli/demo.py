@@ -79,7 +79,7 @@ def _print(
     for line in table(rows, right=range(len(head))):
         out(f"  {line}")
     out(f"\n  phigen K: Poisson Hamiltonian integrator of order K (in the paper {ORDERS[0]}). Errors are relative.")
-    out("  The Casimir stays at round-off to the end; RK2 leaves its level set, and loses the solution.")
+    out("  phigen's error of the Casimir stays at round-off to the end. RK2 leaves the level set of the Casimir.")
 
 
 def singularity(experiment: Experiment) -> float:

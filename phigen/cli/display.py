@@ -46,7 +46,9 @@ class Display:
 
     @contextmanager
     def room(self) -> Iterator[None]:
-        """Context in which the status line is cleared and not drawn, so that a message can be written."""
+        """Context in which the status line is not drawn. It is cleared first, so that a message can be written in its
+        place.
+        """
         with self._lock:
             if self._visible:
                 sys.stderr.write("\r\x1b[K")

@@ -48,14 +48,14 @@ def ended(experiment: E, solver: AnySolver, console: Console) -> E:
 
 
 def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: End | None) -> End | None:
-    """Return the first zero of ``stop``; None if the run ends before it."""
+    """Return the end of the run at the first zero of ``stop``; None if the run ends before that zero."""
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
     g = experiment.function(run.stop, solver)
     max_steps = end.steps + 1 if end else run.steps
     zero = where_zero(experiment.begun(solver), h, max_steps, g, experiment.begin, timed=bool(names.time))
     if zero is None:
-        console.note("the expression of stop: has no zero on the run")
+        console.note("the expression under stop: has no zero during the run")
         return None
     if end is None or zero.steps < end.steps:
         return zero

@@ -19,7 +19,8 @@ def _keep(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     ctx.meta[_FORCE] = value
 
 
-#: The option ``--force``; click reads it before the options that name files.
+#: The option ``--force``. click reads it before the options that name files, since the checks of these files depend on
+#: it.
 force_option = click.option(
     "--force",
     is_flag=True,

@@ -85,7 +85,7 @@ def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
         bonds = ring(sizes[0]) if cell.relation == "graph" else []
     else:
         runs = f", or the name of a run: {', '.join(spec.runs)}" if spec.runs else ""
-        raise click.BadParameter(f"{choice!r} is not sizes such as 3x3{runs}", param_hint=OPTION)
+        raise click.BadParameter(f"{choice!r} does not state sizes, such as 3x3{runs}", param_hint=OPTION)
     count = len(cell.fields)
     for size in sizes:
         count *= size

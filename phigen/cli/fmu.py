@@ -40,7 +40,10 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
 
 
 def write_unit(console: Console, folder: Path, unit: MockupUnit, platforms: Sequence[str]) -> None:
-    """Compile an FMU, and write it to a folder for FMI 3.0 and for 2.0. Raises `ToolchainError`."""
+    """Compile an FMU, and write it to a folder as two files, one for FMI 3.0 and one for FMI 2.0.
+
+    Raises `ToolchainError`.
+    """
     from phigen.fmu.archive import archive, binaries
     from phigen.fmu.platforms import compilers
     from phigen.writing import write_all

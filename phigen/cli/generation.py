@@ -95,7 +95,7 @@ class Options:
         return self.targets or compilation.spec.targets
 
     def command(self, spec_files: Sequence[str]) -> str:
-        """Return the command line that writes the same files."""
+        """Return the command line of ``phigen build`` that writes the same files."""
         arguments = ["phigen", "build", *spec_files]
         if str(self.directory) != DIRECTORY:
             arguments += ["-o", str(self.directory)]
@@ -180,16 +180,21 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
 
 
 def _expect_steps(compilation: Compilation, target: str) -> None:
-    """Raise `SpecError` at the key ``coordinates_from`` if the target is ``device``, since it cannot make steps in
-    relative coordinates."""
+    """Raise `SpecError` at the key ``coordinates_from`` if the target is ``device``.
+
+    The code for devices cannot make steps in relative coordinates, which this key requests.
+    """
     swept = compilation.program.step.swept
     if target == "device" and swept and swept.relative:
-        message, hint = "coordinates_from: devices have no such steps", "another target, or remove coordinates_from"
+        message, hint = (
+            "coordinates_from: the target device has no steps for it",
+            "another target, or remove coordinates_from",
+        )
         raise SpecError([compilation.spec.diagnostic(("coordinates_from",), message, hint)])
 
 
 def _is_bundled(spec: Spec) -> bool:
-    """Whether the text of a spec is that of the bundled spec of this name, wherever the file is."""
+    """Whether a spec has the same name and the same text as a bundled spec, wherever its file is."""
     file = resources.bundled().get(spec.name)
     return file is not None and file.read_text(encoding="utf-8") == spec.source
 

@@ -137,7 +137,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
 
 
 def _past_of(path: Path, run: Run, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
-    """Return the rows of a finished run. Raises one of `_UNREADABLE` for other files."""
+    """Return the rows of a finished run. Raises one of `_UNREADABLE` if the file is not that of a run."""
     if path.suffix.lower() == ".csv":
         return _table(path, interface, shape)
     numbers = run.record if run.records_numbers else ("energy", *interface.observables)

@@ -20,7 +20,7 @@ from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Column
 from phigen.runtime.trajectory import element_columns, trajectory_columns
 
-#: Times are equal if they differ by less than this fraction of the elapsed time.
+#: Two times count as equal if they differ by less than this fraction of the elapsed time.
 _EQUAL = 1e-9
 
 

@@ -63,7 +63,7 @@ class Files:
 
 
 class Recorder:
-    """Recorder of one run: its session, and everything that records results."""
+    """Recorder of one run. It has the session that makes the steps, and stores the results."""
 
     def __init__(self, compilation: Compilation, solver: Solver, experiment: Experiment, files: Files, lyapunov: bool):
         self.solver, self.experiment, self.files = solver, experiment, files

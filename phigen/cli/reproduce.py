@@ -76,5 +76,5 @@ def lines_of(figures: list[dict[str, Any]]) -> list[str]:
 
 
 def _four_digits(value: float) -> str:
-    """Return a number with four digits, or with one digit near round-off."""
+    """Return a number as text with four digits; a number as small as a rounding error has one digit."""
     return f"{value:.0e}" if 0 < abs(value) < 1e-11 else f"{value:.4g}"

@@ -35,7 +35,7 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
         raise click.BadParameter(f"{spec.name} is a graph, whose sites are those of its bonds", param_hint=OPTION)
     sizes = typed_sizes(text)
     if sizes is None:
-        raise click.BadParameter(f"{text!r} is not sizes such as 64x64", param_hint=OPTION)
+        raise click.BadParameter(f"{text!r} does not state sizes, such as 64x64", param_hint=OPTION)
     run = run_of(spec, name)
     assert run.lattice is not None
     axes = spec.lattice.axes

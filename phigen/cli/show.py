@@ -187,7 +187,7 @@ def _print_series(max_terms: int | None, compilation: CompiledSeries) -> None:
 
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:
-    """Return the brackets of coordinates that are not 0, as pairs of name and text."""
+    """Return the non-zero brackets of the coordinates, as pairs of name and text."""
     from phigen.symbolic.readable import readable
 
     system = compilation.system

@@ -88,7 +88,7 @@ def command(
     from phigen.sweeping.sweep import SweepSetting, made
 
     if scheduler and workers:
-        raise click.UsageError("--workers counts processes of this machine: it does not go with --scheduler")
+        raise click.UsageError("--workers counts processes of this machine, so it excludes --scheduler")
     if plot:
         from phigen.drawing.palette import require_matplotlib
 
@@ -118,7 +118,7 @@ def command(
                   "failed": outcome.failed, "dims": dict(outcome.dims)})  # fmt: skip
     else:
         failed = f", of which {outcome.failed} failed (see status)" if outcome.failed else ""
-        click.echo(f"{setting.output}: {outcome.size} members ({sizes}), {outcome.members} made now{failed}")
+        click.echo(f"{setting.output}: {outcome.size} members ({sizes}), {outcome.members} computed now{failed}")
     energy, h = outcome.energy, float(spec.runs[sweep.run].step)
     if warning := sweep_warning(energy.count, outcome.size, energy.largest, h, outcome.order):
         console.warn(warning)

@@ -78,7 +78,7 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         out(f"  Not measured: {'; '.join(names)}: {reason}.")
     if gaining:
         best = gaining[0]
-        out("\nTo paste into the spec" + ", in place of what is above" * bool(tuning.winner) + ":\n")
+        out("\nTo paste into the spec" + ", instead of the lines above" * bool(tuning.winner) + ":\n")
         out("\n".join(monitored_lines(best)))
         out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
         step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(tuning.horizon, run.step)
@@ -153,7 +153,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
     elif tuning.measure == "energy" and not best.curve.bounded:
         yield f"Errors were measured up to {measured_span}, and extrapolated (~) by their observed growth."
     elif tuning.measure == "energy":
-        yield f"Errors were measured up to {measured_span}. Later, only rounding adds to phigen's (~: estimated)."
+        yield f"Errors were measured up to {measured_span}. Later, only rounding errors grow in phigen (~: estimated)."
     else:
         yield f"Errors were measured up to {measured_span}, and extrapolated to {full_span} (~) by linear growth."
     if tuning.measure == "energy":
@@ -163,7 +163,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
     if tuning.orbit_error is not None:
         yield (
             f"Up to {tuning.clock} = {tuning.piece:.4g} the error of the orbit is at most {tuning.orbit_error:.1e} of "
-            "its size; --measure orbit chooses settings by this error."
+            "the size of the orbit; --measure orbit chooses settings by this error."
         )
     if tuning.sizes:
         sites = "×".join(map(str, tuning.sizes))
@@ -201,7 +201,7 @@ def _extrapolated(tuning: Tuning) -> str:
 
 
 def _other_rows(tuning: Tuning) -> list[list[str]]:
-    """Return table rows with the cheapest setting for each of `_FURTHER_ACCURACIES` that a measured setting reached."""
+    """Return table rows for `_FURTHER_ACCURACIES`: for each that was reached, the cheapest measured setting."""
     from phigen.tuning.search import cheapest_step
 
     rows = []

@@ -114,7 +114,9 @@ def command(
         real=real,
     )
     if options.words and not spec_files:
-        raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
+        raise click.UsageError(
+            "options that change the generated files need a SPEC; without SPEC, the manifest has the options"
+        )
     (entries, systems), collector = manifest.read(folder), Collector()
     asked = {"cmake": cmake, "meson": meson, "python": python}
     build_systems = [system for system in FILES if asked[system] or system in systems]
@@ -174,7 +176,7 @@ def _from_specs(
 def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector: Collector) -> list[VendorRequest]:
     """Return requests for all solvers in the manifest.
 
-    The text of a spec comes from its file, or if the file is absent from the copy in the manifest.
+    The text of a spec is read from its file. If the file is missing, the copy of the text in the manifest is used.
     """
     from phigen import spec as specs
 

@@ -80,7 +80,7 @@ def test_a_run_ends_where_an_expression_vanishes_first_to_roundoff(phigen, swing
     ran(phigen, swing, "--run", "back", "-o", "b.csv")  # the run also starts at a zero of stop, which does not end it
     assert table("b.csv")[-1, 0] == pytest.approx(-np.pi, abs=1e-11)
     never = phigen("run", swing, "--run", "never", "-t", "numpy", "-o", "c.csv")
-    assert "the expression of stop: has no zero on the run" in never.stderr
+    assert "the expression under stop: has no zero during the run" in never.stderr
     assert len(table("c.csv")) == 21
 
 
@@ -522,7 +522,7 @@ def test_a_stop_of_the_command_line_is_that_of_the_spec(phigen, write, text, run
     result = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
     # The chain is integrated with order 4, hence the larger tolerance.
     assert json.loads(result.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)
-    assert "the expression of stop: has no zero on the run" in phigen(*command, "--stop", f"{name} - 2").stderr
+    assert "the expression under stop: has no zero during the run" in phigen(*command, "--stop", f"{name} - 2").stderr
     for wrong, words in (("1/2", "depends neither"), (f"{name} -", "ends too early"), (f"{name}s", "did you mean")):
         refused = phigen(*command, "--stop", wrong)
         assert refused.exit_code == 2

@@ -89,7 +89,7 @@ def test_a_run_names_the_sizes_of_its_expansion(phigen, lattice):
     ("sizes", "code", "message"),
     [
         ("3", 2, "sizes must be 2 positive integers, for the axes i, j; got 3"),
-        ("a", 2, "'a' is not sizes such as 3x3, or the name of a run: quench"),
+        ("a", 2, "'a' does not state sizes, such as 3x3, or the name of a run: quench"),
         ("1x4", 1, "sizes are at least 2x2"),
         ("20x20", 3, "1200 coordinates; an ordinary spec has at most 256"),
     ],

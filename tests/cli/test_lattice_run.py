@@ -202,8 +202,8 @@ def test_a_run_has_other_sizes_on_request(phigen, chain, tmp_path):
     [
         ("3x3", "3x3 has 2 sizes; chain has one axis"),
         ("1", "1 is too small for the stencil; sizes are at least 2"),
-        ("3,3", "'3,3' is not sizes such as 64x64"),
-        ("0", "'0' is not sizes"),
+        ("3,3", "'3,3' does not state sizes, such as 64x64"),
+        ("0", "'0' does not state sizes"),
     ],
 )
 @pytest.mark.parametrize("command", ["run", "verify"])

@@ -219,7 +219,7 @@ def test_files_of_a_target_that_is_dropped_go_and_those_of_the_user_stay(phigen,
 def test_second_time_leaves_files_alone(phigen, vendored):
     before = [p.stat().st_mtime_ns for p in EXT.iterdir()]
     assert "a unchanged" in phigen("vendor", EXT).stderr
-    assert "need the SPEC" in phigen("vendor", EXT, "--order", "4").stderr
+    assert "need a SPEC" in phigen("vendor", EXT, "--order", "4").stderr
     assert [p.stat().st_mtime_ns for p in EXT.iterdir()] == before
 
 

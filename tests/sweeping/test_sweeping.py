@@ -131,7 +131,7 @@ def test_stored_values_of_members_agree_with_single_runs(spec, cluster, tmp_path
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(store), "--scheduler", cluster.scheduler_address]
     result = CliRunner().invoke(group, [*arguments, "--plot", str(tmp_path / "map.svg")])
     assert result.exit_code == 0, result.output
-    assert "6 members (I2 2 × x1 3), 6 made now" in result.output
+    assert "6 members (I2 2 × x1 3), 6 computed now" in result.output
     assert "<svg" in (tmp_path / "map.svg").read_text()
     assert str(read_origin(tmp_path / "map.svg")).endswith(" by sweep")
     data = xarray.open_zarr(store).load()
@@ -604,7 +604,7 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "--plot", str(tmp_path / "s.svg")]
     result = CliRunner().invoke(group, [*arguments, "-t", "numpy", "--scheduler", cluster.scheduler_address])
     assert result.exit_code == 0, result.output
-    assert "4 members (J 2 × step 2), 4 made now, of which 2 failed" in result.output
+    assert "4 members (J 2 × step 2), 4 computed now, of which 2 failed" in result.output
     data = xarray.open_zarr(tmp_path / "s.zarr").load()
     assert (np.isnan(data.energy_error) == [[False, True]] * 2).all()
     shown = CliRunner().invoke(group, [*arguments, "--show", "final"])
