@@ -71,8 +71,10 @@ def _one_of(choices: Sequence[str]) -> str:
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
-    """Return the callback of an option that names a file, which checks the suffix and the folder before any work is
-    done."""
+    """Return the callback of an option that names a file.
+
+    The callback checks the suffix of the file and its folder before any work is done.
+    """
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
         if value is None:

@@ -20,7 +20,11 @@ LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return the planned changes of each system, extended by its bindings and by the C files that the bindings call."""
+    """Return the planned changes of each system, extended by its bindings and by the C files that the bindings
+    call.
+
+    Raises `SpecError` with a list of the systems for which bindings cannot be generated.
+    """
     from phigen.bindings.emitter import binding
     from phigen.cli.outputs import Change, read
 

@@ -101,11 +101,11 @@ def command(
 ) -> None:
     """Prove a bound for the distance between a step of the generated C and the exact Poisson map.
 
-    The bound holds for all steps that begin in a box of states, for C of profile small. Ball arithmetic proves it. It
-    covers the rounding of every operation, the stopping criterion of Newton's method, and the errors of libm. For an
-    implicit step, the proof shows that its equation has exactly one solution near the computed one. DIR/NAME receives
-    the C, the certificate NAME.bounds.json, and a checker that verifies the certificate without phigen. Exit code 5 if
-    there is no certificate for the box; the message says what to try.
+    The bound holds for all steps that begin in a box of states, for C of profile small. Ball arithmetic proves it. The
+    bound covers the rounding of every operation, the stopping criterion of Newton's method, and the errors of libm. For
+    an implicit step, the proof shows that its equation has exactly one solution near the computed one. DIR/NAME
+    receives the C, the certificate NAME.bounds.json, and a checker that verifies the certificate without phigen. Exit
+    code 5 if there is no certificate for the box; the message says what to try.
     """
     from phigen.certify.checker import RefusedError
     from phigen.certify.problem import problem_of

@@ -57,7 +57,7 @@ class Console:
 
     @contextmanager
     def heeding(self) -> Iterator[None]:
-        """Context in which warnings of phigen's library are printed like those of commands."""
+        """Context in which warnings that phigen raises as a Python library are printed like warnings of commands."""
         with warnings.catch_warnings():
             library_function = warnings.showwarning
 
@@ -174,7 +174,7 @@ def out_document(text: str) -> None:
 
 @contextmanager
 def _stdout() -> Iterator[None]:
-    """Context in which errors of writing name stdout."""
+    """Context in which an error of writing becomes an error that names stdout as the file."""
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
     try:

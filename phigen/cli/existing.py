@@ -91,7 +91,7 @@ def wrote(path: Path) -> str:
 def _is_of_phigen(path: Path) -> bool:
     """Whether phigen seems to have written a file.
 
-    This is so if a table has the column t, and if any other file contains the word phigen.
+    A table must have the column t. A file of any other kind must contain the word phigen.
     """
     match path.suffix.lower():
         case ".csv":

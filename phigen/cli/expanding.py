@@ -20,7 +20,7 @@ OPTION = "--expand"
 
 
 def expanded_text(spec: Spec, sizes: str) -> str:
-    """Return the text of an ordinary spec for a lattice.
+    """Return the text of the ordinary spec into which a lattice expands.
 
     ``sizes`` are sizes such as ``3x3``, or the name of a run with the sizes.
     """
@@ -43,7 +43,7 @@ def expanded_text(spec: Spec, sizes: str) -> str:
 
 
 def lattice_text(spec: Spec) -> str:
-    """Return the text of a lattice spec for an ordinary spec in which identical sites are written out."""
+    """Return the text of a lattice spec, from an ordinary spec that writes out identical sites one by one."""
     from phigen.lattice.recognition import MIN_SITES_PER_AXIS, recognised_lattice
     from phigen.spec.yaml_text import spec_text
 

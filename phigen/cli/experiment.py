@@ -62,7 +62,7 @@ class Experiment:
     def made(self) -> int:
         """Number of steps of the finished run ``past``; a partial last step counts as a whole one.
 
-        Each step has used up the random numbers of one step, also a partial one.
+        A run with noise has used up the random numbers of this number of steps.
         """
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))

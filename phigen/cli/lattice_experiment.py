@@ -1,4 +1,4 @@
-"""A run of a lattice, changed by options of the command line, which may continue another run."""
+"""A run of a lattice, changed by options of the command line. It may continue another run."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def relative(spec_file: str, folder: Path) -> str | None:
     Returns None if the relative path leads through the root or a home folder, since it would mean nothing on another
     machine.
     """
-    source, target = Path(os.path.abspath(spec_file)), Path(os.path.abspath(folder))  # noqa: PTH100  (".." as text)
+    source, target = Path(os.path.abspath(spec_file)), Path(os.path.abspath(folder))  # noqa: PTH100  (resolve() would follow links)
     common = Path(os.path.commonpath([source, target]))
     if common == Path(common.anchor) or Path("~").expanduser().is_relative_to(common):
         return None

@@ -89,7 +89,8 @@ def apply(planned: Iterable[Change]) -> None:
 def read(path: Path) -> str | None:
     """Return the text of a file, None if it is absent.
 
-    Undecodable bytes are replaced, since files of phigen are in UTF-8, and other files are not compared.
+    Bytes that are not UTF-8 are replaced: files of phigen are in UTF-8, and the exact text of other files does not
+    matter.
     """
     try:
         return path.read_bytes().decode("utf-8", "replace")

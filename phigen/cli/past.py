@@ -157,7 +157,7 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
 def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     """Return the experiment that continues a finished run, whose rows are in the file ``path``.
 
-    Raises a `click.UsageError` for the file of another run, and for a run that its file cannot continue.
+    Raises a `click.UsageError` for the file of another run, and for a run that cannot be continued from its file.
     """
     names = solver.interface
     if experiment.run.record:

@@ -47,8 +47,8 @@ def command(
 
     The page shows the solver running beside RK4, the formulas, the choices of the compiler with their reasons, the
     proofs of `phigen check`, the measurements of `phigen verify`, figures of a run, and errors against step and time in
-    comparison with classical methods. It needs no network. Nothing is written if the mathematics of the spec is
-    refuted. Exit code 5 if a measurement misses its bound; the page shows which.
+    comparison with classical methods. The page needs no network. Nothing is written if the mathematics of the spec is
+    refuted. Exit code 5 if a measurement misses its bound; the page shows which one.
     """
     from phigen.cli.report_lattice import gathered_of_lattice
     from phigen.cli.report_material import gathered

@@ -28,9 +28,9 @@ def load_one(source: str) -> Spec:
 
 
 def spec_path(source: str) -> str:
-    """Return the path of a spec file or of a folder with specs, or else that of the bundled spec of that name.
+    """Return the path of a spec file, of a folder with specs, or of a bundled spec.
 
-    Raises `SpecError` if there is neither.
+    The bundled spec is taken if no file or folder has its name. Raises `SpecError` if there is no bundled spec either.
     """
     path = Path(source)
     # A folder such as that of `phigen build kepler -o .` must not hide the bundled spec kepler.
@@ -42,7 +42,7 @@ def spec_path(source: str) -> str:
 
 
 def as_given(spec: Spec) -> str:
-    """Return the name of a spec for a command line: its file, or the name of a bundled spec."""
+    """Return the text by which a command line names a spec: its file, or the name of a bundled spec."""
     return resources.bundled_name(spec.file) or spec.file
 
 

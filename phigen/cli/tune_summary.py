@@ -132,7 +132,7 @@ def gauge_of(curve: Curve) -> str:
 
 
 def scheme_of(curve: Curve) -> str:
-    """Return the name of the construction by which the method reaches its order."""
+    """Return the name of the construction by which the method reaches its order, such as a composition."""
     if curve.setting is None:
         return "explicit"
     composition = curve.composition or curve.setting.composition

@@ -24,8 +24,8 @@ def draw_along(axes: Any, constancy: Constancy) -> None:
 def draw_against_step(axes: Any, constancy: Constancy) -> None:
     """Draw the largest error of the modified Hamiltonian H̃ over the step size.
 
-    There is a curve for each number of corrections. A thin line beside it has the slope of the expected power of the
-    step.
+    There is a curve for each number of corrections. A thin line beside each curve has the slope that is expected for
+    it.
     """
     for m, power in enumerate(constancy.powers):
         changes = constancy.changes[:, m]

@@ -2,7 +2,7 @@
 
 Each function returns a `matplotlib.figure.Figure`, and does not change matplotlib's global state. Colours are those of
 `phigen.drawing.palette.PALETTE`. The functions `save` and `svg` of that module write equal figures with equal bytes.
-matplotlib is not required by phigen; without it, every function raises `MissingPackageError`.
+matplotlib is an optional dependency, in the extra ``plot``; without it, every function raises `MissingPackageError`.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def _styled() -> Iterator[None]:
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a function that draws or writes figures, so that it runs in `_styled`."""
+    """Decorate a function that draws or writes figures, so that it uses the settings of this module."""
 
     @wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> T:

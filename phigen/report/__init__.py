@@ -1,1 +1,1 @@
-"""Reports: one self-contained HTML page about a spec, its solver, and what was proved and measured of both."""
+"""Reports: one self-contained HTML page about a spec and its solver, with proofs and measurements."""

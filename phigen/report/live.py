@@ -23,7 +23,7 @@ from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
 #: Orders that the panel offers in addition to the order of the page; and largest number of characters of the JavaScript
-#: for all these orders together.
+#: for all orders together.
 ORDERS, MOST = (2, 4), 200_000
 #: FEW: groups with at most this number of sliders are shown unfolded. COORDINATES: largest number of coordinates with
 #: sliders. STEP, SPEED, PARAMETER: largest factors by which sliders change the step, the speed and a parameter.

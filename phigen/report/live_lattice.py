@@ -83,9 +83,8 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}
     for name, density in cell.invariants.items():
-        apart = "_" * (
-            1 + max(map(len, spec.observables), default=0)
-        )  # makes the new names longer than all names of the spec
+        # the suffix makes the new names longer than all names of the spec
+        apart = "_" * (1 + max(map(len, spec.observables), default=0))
         densities[f"{name}{apart}"] = density
         densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
     if not densities:
