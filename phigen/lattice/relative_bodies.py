@@ -196,9 +196,10 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
     for key, (present, reason) in refused.items():
         if present:
             hint = f"remove {KEY}" if key == "lattice" else f"remove {KEY}, or {key}"
+            key_text = "a grid or a graph" if key == "lattice" else key
             if key == "adjoint":
                 hint = f"phigen show --expand RUN prints an ordinary spec, which takes {KEY} if it has momenta"
-            raise SpecError([spec.diagnostic((KEY,), f"{KEY} cannot be combined with {key}: {reason}", hint)])
+            raise SpecError([spec.diagnostic((KEY,), f"{KEY} cannot be combined with {key_text}: {reason}", hint)])
 
 
 def _positions(cell: Cell) -> list[str]:
