@@ -256,11 +256,21 @@ def _systems(facts_by_name: dict[str, dict[str, Any]]) -> str:
     )
 
 
+def _method(label: str) -> str:
+    """Return the name of a method. The label of a series names only its bi-realisation."""
+    if label.startswith(("splitting", "Gauss")):
+        return label
+    kind, _, rest = label.partition(", ")
+    return f"series with the bi-realisation `{kind}`{' ' + rest if rest else ''}"
+
+
 def _lattice_entry(specification: Spec, fact: dict[str, Any]) -> str:
     run = longest_run(specification)
     image = f"![{specification.title}: a run over space and time](figures/gallery/{specification.name}.svg)"
-    method_text = f"Sites: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
-    length = f"Run `{run.name}`: {' × '.join(map(str, fact['sites']))} sites, {run.steps} steps of {float(run.step):g}."
+    method_text = f"Sites: {fact['structure']}. Method: {_method(fact['method'])}, order {fact['order']}."
+    length = (
+        f"Run `{run.name}`: {' × '.join(map(str, fact['sites']))} sites, {run.steps} steps of size {float(run.step):g}."
+    )
     formulas = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in fact["formulas"]]
     return "\n\n".join(
         ["", f"## {specification.name}", f"**{specification.title}.** {specification.description}", image,
@@ -275,8 +285,8 @@ def _entry(specification: Spec, fact: dict[str, Any]) -> str:
         images.append(f"![{specification.title}: a Poincaré section](figures/gallery/{specification.name}_section.svg)")
     lines = [f"H = {fact['hamiltonian']}", *(f"{name} = {e}" for name, e in fact["casimirs"].items())]
     formulas = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in lines]
-    method_text = f"π: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
-    length = f"Run `{run.name}`: {run.steps} steps of {float(run.step):g}."
+    method_text = f"π: {fact['structure']}. Method: {_method(fact['method'])}, order {fact['order']}."
+    length = f"Run `{run.name}`: {run.steps} steps of size {float(run.step):g}."
     return "\n\n".join(
         ["", f"## {specification.name}", f"**{specification.title}.** {specification.description}", "\n".join(images),
          "```text\n" + "\n".join(formulas) + "\n```", f"{method_text} {length}", _table(fact["errors"])]
