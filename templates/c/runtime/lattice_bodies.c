@@ -11,8 +11,8 @@
    mass of all bodies before it. In democratic heliocentric coordinates, positions are relative to the first body, and
    velocities to the centre of mass. */
 
-/* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative, their
-   sum must be finite, and the first body, and bodies with momenta, must have one. */
+/* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative,
+   their sum must be finite, and the masses of the first body and of bodies with momenta must be positive. */
 static int phi_weigh(phi_solver *s)
 {
     const double *m = s->x[PHI_MASS];

@@ -4,8 +4,8 @@
 #include "model.h"
 #include "rows.c"
 
-/* Combine count densities of one observable with *sum: add them, with the compensation term *rest after A. Neumaier, or take
-   the largest or the smallest (kinds 0 to 3: mean, sum, largest, smallest). */
+/* Combine `count` densities of one observable with *sum: add them, with the compensation term *rest after A. Neumaier,
+   or take the largest or the smallest (kinds 0 to 3: mean, sum, largest, smallest). */
 static void phi_reduce(int kind, size_t count, const double *density, double *sum, double *rest)
 {
     for (size_t i = 0; i < count; ++i) {
