@@ -180,7 +180,10 @@ def _rows(values: Any, name: str, count: int | None = None) -> Floats:
 
 
 def _checked(earlier_run: Past, shape: tuple[int, ...]) -> Past:
-    """Return the finished run unchanged. Raises `ValueError` if its last state has another shape or is not finite."""
+    """Return the finished run unchanged.
+
+    Raises `ValueError` if its states have another shape, or if its last state is not finite.
+    """
     if earlier_run.first.shape != shape or earlier_run.last.shape != shape:
         raise ValueError(f"its states have the shape {earlier_run.last.shape}, those of the run {shape}")
     if not (np.isfinite(earlier_run.last).all() and np.isfinite(earlier_run.t[-1])):

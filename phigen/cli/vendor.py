@@ -160,7 +160,7 @@ def _from_specs(
     checking: bool,
     collector: Collector,
 ) -> list[VendorRequest]:
-    """Return the requests for the specs on the command line, with the options on the command line.
+    """Return the requests for the specs that the command line names, with its options.
 
     A check without options uses the options of each solver in the manifest.
     """
