@@ -30,7 +30,7 @@ def described(cell: Cell) -> str:
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the nonzero brackets as pairs of the left side as text, ``{a, b}``, and the expression.
+    """Return the nonzero brackets as pairs: the left side ``{a, b}`` as text, and the expression.
 
     Of {a, b} and {b, a} only one is listed. Brackets of fields at one site come first, then brackets with neighbours.
     """
@@ -91,8 +91,8 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
     """Return the equations of motion at a site of a grid, as tuples of left side (a text) and right side.
 
-    For a lattice without axes (a graph, or pairs of sites), the left sides are derivatives ∂h/∂x instead, where h is
-    the density of H of a site, and then that of a bond or pair.
+    For a lattice without axes (a graph, or pairs of sites), the derivatives ∂h/∂x are returned instead. First come
+    those of the density h of H at a site, then those of the density h of a bond or pair.
     """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
@@ -101,14 +101,16 @@ def rates(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def document(cell: Cell) -> str:
-    """Return the formulas of a lattice as LaTeX, with the indices of all sites, as in {x_i, y_{i+1}}."""
+    """Return the formulas of a lattice as LaTeX. Every value has the index of its site, as in {x_i, y_{i+1}}."""
     blocks = [aligned(equations) for _, equations in formulas(cell)]
     head = f"% {cell.name}, {described(cell)}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
 
 
 def formulas(cell: Cell) -> Iterator[tuple[str, list[Equation]]]:
-    """Yield pairs of a title and its equations in MathML, with the indices of all sites, as in {x_i, y_{i+1}}."""
+    """Yield pairs of a title and its equations in MathML. Every value has the index of its site, as in {x_i,
+    y_{i+1}}.
+    """
     if left := [(_bracket(cell, name), e) for name, e in brackets(cell)]:
         yield "Poisson tensor", _equations(cell, left)
     sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}

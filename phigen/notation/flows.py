@@ -27,7 +27,8 @@ def method(compilation: CompiledSplitting) -> str:
 def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
     """Return the coordinates that a flow changes, each with its value after the time h.
 
-    Entries of a matrix exponential have the letter E, the number of the matrix from `matrices`, row and column.
+    An entry of a matrix exponential is a symbol such as E12: the letter E, the number of the matrix if there are
+    several (see `matrices`), and the entry's row and column.
     """
     entries: dict[str, Expression] = {}
     for number, matrix in matrices(compilation):
@@ -62,7 +63,8 @@ def _place(matrix: MatrixExponential, k: int) -> str:
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
     """Return the generator of a flow as pairs (name, expression).
 
-    It is a Hamiltonian, with the name "", or a force: its nonzero components have the names of coordinates.
+    If the generator is a Hamiltonian, there is one pair, with the name "". If it is a force, there is a pair for each
+    nonzero component, with the name of its coordinate.
     """
     if not flow.force:
         return [("", flow.hamiltonian)]
@@ -92,8 +94,7 @@ def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tupl
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
-    """Return the flows of a step in their order, as pairs (number of the part, fraction of h); numbers count
-    from 0.
+    """Return the flows of a step in their order, as pairs (number of the part, fraction of h); numbers count from 0.
 
     If the step is no splitting, the list is empty.
     """

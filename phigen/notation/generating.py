@@ -48,8 +48,10 @@ class Generating:
 
 
 def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Generating:
-    """Return the generating function as formulas; at most ``max_terms`` terms of each S_i are displayed, None for
-    all."""
+    """Return the generating function as formulas.
+
+    At most ``max_terms`` terms of each S_i are displayed; None displays all.
+    """
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     has_modified = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO

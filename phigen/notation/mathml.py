@@ -73,7 +73,7 @@ class Factor:
         return summed(self.terms) if self.terms else self.markup
 
     def power(self, exponent: str) -> Factor:
-        """Return this factor raised to an exponent, which is markup."""
+        """Return a power of this factor; ``exponent`` is markup."""
         if self.raised:
             return Factor(_parentheses(self.markup)).power(exponent)
         kind, index = ("msubsup", self.index) if self.index else ("msup", "")
@@ -191,7 +191,10 @@ def indexed(letter: str, index: str) -> str:
 
 
 def component(letter: str, k: int, c: str) -> str:
-    """Return the markup of a letter with the index ``k``, as H_2; with a coordinate ``c`` as exponent, as F_3^{x}."""
+    """Return the markup of a letter with the index ``k``, such as H_2.
+
+    If ``c`` is the name of a coordinate, it becomes an exponent, as in F_3^{x}; with "" there is no exponent.
+    """
     if not c:
         return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
     return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
@@ -261,7 +264,7 @@ def _times(*factors: Sum) -> Sum:
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
-    """Return the factors, in which equal factors are combined to a power, unless they are powers already."""
+    """Return the factors, with equal ones combined to a power; factors that are powers already are not combined."""
     counts = Counter(factors)
     powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))

@@ -89,7 +89,10 @@ def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) ->
 
 
 def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
-    """Return the names of subexpressions that are 0 if all momenta are 0, from pairs (name, definition)."""
+    """Return the names of those subexpressions that are 0 if all momenta are 0.
+
+    ``subexpressions`` are pairs (name, definition).
+    """
     zeros: dict[str, Expression] = {}
     for name, part in subexpressions:
         zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}

@@ -15,8 +15,8 @@ def as_powers(casimir: Expression) -> str | None:
     return f"log|{'*'.join(factors)}|"
 
 
-#: A linear combination of log x_i² as {name of x_i: coefficient}; the key None has the constant term. For an expression
-#: of another form, the value None instead of a dictionary.
+#: A linear combination of log x_i² as {name of x_i: coefficient}; the key None has the constant term. None instead of a
+#: dictionary stands for an expression that is no such combination.
 _Sum = dict[str | None, Expression] | None
 
 
