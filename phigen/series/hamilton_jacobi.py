@@ -35,12 +35,12 @@ from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-#: Largest number of monomials of a gradient ∇S_i. In generated code, 4.3 to 10 operations were measured for each of
-#: these monomials, those of the Hessian included.
+#: Largest number of monomials of a gradient ∇S_i. In measurements, generated code for the gradient and the Hessian had
+#: 4.3 to 10 operations for each monomial of the gradient.
 MOST_SLOPES = limits.OPERATIONS // 4
 
-#: From S_7 on, the sizes of the terms computed so far predict the sizes of later terms, which grow like a power of the
-#: index.
+#: From S_7 on, the sizes of later terms are predicted: they grow like a power of the index, and the exponent is
+#: determined from the terms computed so far.
 FORESEEN = 7
 
 
@@ -243,7 +243,10 @@ class _Recursion:
         return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:
-        """Raise `OverflowError` if the sizes of the gradients so far predict more than `MOST_SLOPES` for ∇S_terms."""
+        """Raise `OverflowError` if ∇S_terms is expected to have more than `MOST_SLOPES` monomials.
+
+        The expected number follows from the sizes of the gradients that have been computed so far.
+        """
         *_, previous, latest = [0, 0, *self._sizes]
         if latest < FORESEEN or previous == 0:
             return

@@ -42,9 +42,10 @@ def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], 
 
 
 def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
-    """Return the part of degree ``degree`` + 1 in p of one component of π(m)p: π(m) in ``degree``, times p.
+    """Return one component of the part of π(m)p that has the degree ``degree`` + 1 in p.
 
-    ``deviation`` is m − x. ``row`` has the Taylor coefficients of the entries of π in the row of this component.
+    It is the part of π(m) of degree ``degree``, times p. ``deviation`` is m − x. ``row`` has the Taylor coefficients of
+    the entries of π in the row of this component.
     """
     return functions.total(
         deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)

@@ -44,10 +44,10 @@ class Arrays(Arithmetic[Any]):
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
-    """Return the values of expressions as arrays; ``values`` maps symbols to arrays, which are elementwise, or to
-    numbers.
+    """Return the values of expressions as arrays, computed elementwise.
 
-    Outside its domain a function gives NaN or infinity. Raises `KeyError` for a symbol without a value.
+    ``values`` maps the name of each symbol to an array or a number. Outside its domain a function gives NaN or
+    infinity. Raises `KeyError` for a symbol without a value.
     """
     with np.errstate(all="ignore"):
         return [np.asarray(v, dtype=np.float64) for v in Arrays(values).values(roots)]

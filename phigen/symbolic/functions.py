@@ -40,7 +40,7 @@ class Function:
 
     ``written`` maps a language to the spelling of the function: a name, or a text with ``{0}``, ``{1}`` for the
     arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in C
-    loops over SIMD lanes: the name, if the function has a vectorised version, or a formula in such functions.
+    loops over SIMD lanes: the name of a vectorised version, or a formula that contains only vectorised functions.
     ``inline`` says that the code has no call, only arithmetic or an instruction. ``near`` says that for small arguments
     flows use a version that is a polynomial. ``letters`` is the name in mathematics.
     """

@@ -59,9 +59,10 @@ Monomial = tuple[tuple[Expression, Fraction], ...]
 
 @dataclass(frozen=True)
 class Formula:
-    """A sum of ``terms``, pairs (coefficient, monomial), divided by ``divisor``, for display.
+    """A formula for display: the sum of ``terms``, divided by ``divisor``.
 
-    ``hidden`` is the number of further terms, which are replaced by an ellipsis.
+    Each term is a pair (coefficient, monomial). ``hidden`` is the number of further terms, which are replaced by an
+    ellipsis.
     """
 
     divisor: int

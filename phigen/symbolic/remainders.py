@@ -20,7 +20,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Names, in expressions, of F_0, …, F_3; below, of G_0, …, G_3. Their arguments are t, a_0, …, a_3.
+#: Names, in expressions, of F_0, …, F_3, functions of t, a_0, …, a_3. Below, names of G_0, …, G_3, with the same
+#: arguments.
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 

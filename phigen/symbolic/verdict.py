@@ -61,8 +61,7 @@ class Statement:
 def decide_zero(
     name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its
-    verdict.
+    """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its verdict.
 
     ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the part in a refutation.
     ``positive`` are the symbols that take positive values only. ``detail`` is the detail of the statement if proved.
@@ -102,7 +101,7 @@ def _at_points(
     """Return the statement ``name``, decided by the values of its residuals (``pending``) at sample points.
 
     A nonzero value at one point refutes the statement. Otherwise it is checked numerically, or undecided if there is a
-    residual that could not be evaluated at any point. ``describe`` returns the text of the residual with this index.
+    residual that could not be evaluated at any point. ``describe(k)`` returns residual number k as text.
     """
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
