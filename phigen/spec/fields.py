@@ -288,7 +288,7 @@ _BESIDE_RUNS = {
 } | {
     "tolerance": "solver: {tolerance: …} belongs beside runs, to the whole spec",
     "reconstruct": "reconstruct: belongs beside runs; an attitude starts at the identity, in Python at attitude0=",
-    "retry": "solver.integrate(…, retry=n) in Python makes steps that fail in parts",
+    "retry": "solver.integrate(…, retry=n) in Python divides a step that fails into smaller ones",
     "time": "start is the time at the start of a run, until that at its end",
 }
 
@@ -502,7 +502,7 @@ SPEC = Record(
         RecordKey(
             "coordinates_from",
             OneOf(RELATIVE),
-            "scheme splitting: attracting bodies are split in their motions in these coordinates and a small remainder",
+            "scheme splitting, attracting bodies: H is split into motions in these coordinates and a small remainder",
         ),
         RecordKey(
             "profile",

@@ -27,7 +27,7 @@ _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 
 
 def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]:
-    """Return the density of H of a site, and that of a bond or pair, which is 0 if the spec has none.
+    """Return two densities of H: that of a site, and that of a bond or pair. A density that the spec lacks is 0.
 
     ``raw`` is the value of ``hamiltonian:``, an expression or a mapping. H is the sum of the first density over all
     sites plus the sum of the second one over all bonds or pairs.
@@ -114,7 +114,9 @@ def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields
     hint = "observables: {{M: {{mean: {}}}}} makes it a number, which may be named here"
     local = [n for n, e in declared.definitions.items() if set(at_sites).intersection(symbols_of(e))]
     several = dict.fromkeys([*declared.coordinates, *fields, *sorted(declared.varying), *at_sites, *local])
-    refused = {n: (f"{n!r} has a value at each site, and this is one number for all", hint.format(n)) for n in several}
+    refused = {
+        n: (f"{n!r} has a value at each site, but this expression must be one number", hint.format(n)) for n in several
+    }
     names = {n: e for n, e in scope.names.items() if n not in refused} | {n: symbol(n) for n in observables}
     indices = Indices(declared.neighbours, {}, refused)
     return replace(scope, names=names, refused={**scope.refused, **refused}, indices=indices)

@@ -107,8 +107,8 @@ def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
 def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
     """Return the reason why a sweep cannot average observables over the rows of this run; "" if it can.
 
-    Sweeps average over states after whole steps, or over their frames, and know the times of steps only if these are
-    equal in physical time.
+    A sweep averages over states after whole steps, or over its frames. With a monitor, it does not know the physical
+    times of these states.
     """
     averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
     if not averages:
@@ -128,7 +128,10 @@ def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: st
 
 
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
-    """Return the range of one quantity, a list or an interval, as a list of one axis; [] after reported errors."""
+    """Return a list with the axis for the range of one quantity; [] after reported errors.
+
+    ``value`` is a list of values, or an interval {from: …, to: …}.
+    """
     name, numbers = key.text, declared.numbers()
     allowed_names = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
     if name not in allowed_names and not declared.incomplete:
@@ -194,9 +197,9 @@ def _expect_sense(
     if sweep.random and grid:
         _fail(
             axes_place,
-            f"over: {grid[0].name} has a count, but random members are drawn",
+            f"over: {grid[0].name} has a count or a list, but with random: all values are drawn at random",
             declared,
-            "leave out the count",
+            f"write {grid[0].name}: {{from: a, to: b}}, or remove random:",
         )
     if random_axes and not (sweep.random or incomplete or any(axis.name == "seed" for axis in grid)):
         hint = "add a count, or seed: {count: 10} for 10 random members"

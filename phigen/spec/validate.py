@@ -167,7 +167,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
-        "it changes H, so e = -H(x0) would not be constant, and in tau its amplitude would depend on the state",
+        "noise changes H, so e = -H(x0) would not be constant, and in tau its amplitude would depend on the state",
         "remove monitor; then all steps have the same size in time",
     ),
     "composition": (
@@ -306,8 +306,7 @@ def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dic
 def _gauge(
     raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
-    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are subtracted
-    from H.
+    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are subtracted from H.
 
     The multiples must be constant along trajectories, so those that depend on coordinates are reported.
     """

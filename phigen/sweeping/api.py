@@ -49,7 +49,7 @@ def sweep(
     profile: str | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> xr.Dataset:
-    """Repeat a run for many parameters, initial values or steps, and return results with the dimensions of ``over``.
+    """Repeat a run for many parameters, initial values or steps, and return the results as a Dataset.
 
     Each repetition is a *member* of the sweep. The sweep is the one called ``name`` in the spec, the first by default;
     other arguments replace its settings. If the spec has no sweep, ``over`` is required; if it has no run, ``initial``,
@@ -193,7 +193,10 @@ def _sweep_of(
     if drawn and not sweep.random and not any(axis.name == "seed" for axis in sweep.over):
         raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
     if sweep.random and len(drawn) < len(sweep.over):
-        raise ValueError("over: random members are drawn, so there are no counts and no lists")
+        raise ValueError(
+            "over: with random, all values are drawn at random: give from and to without count, and no lists, "
+            "or remove random"
+        )
     if sweep.file and (sweep.over or sweep.random):
         raise ValueError("over: a file holds all values; remove the other keys")
     if not (sweep.over or sweep.file):
