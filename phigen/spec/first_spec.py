@@ -50,7 +50,7 @@ runs:
     initial: [0.1, 1, 0.1]
     step: 0.05
     duration: 100               # or steps: 2000
-    stride: 10                  # every how many steps are stored
+    stride: 10                  # steps from one stored state to the next
 """
 
 
@@ -93,7 +93,7 @@ runs:
     initial: {{random: sphere, seed: 1}}   # or by field: {{x: sin(2*pi*i/N_i), …}}, or a file state.npy
     step: 0.05
     duration: 50                # or steps: 1000
-    stride: 10                  # every how many steps are stored
+    stride: 10                  # steps from one stored state to the next
 """
 
 

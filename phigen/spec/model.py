@@ -105,7 +105,8 @@ class LieAlgebraForm:
     """Lie–Poisson brackets {x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra; ``sign`` is 1 or −1.
 
     The algebra comes from exactly one of three sources: a ``family`` with a ``size``, the ``matrices`` of a basis, or
-    ``structure_constants``. There, [i][j][k] is c_ij^k with indices from 0, for the pairs (i, j) in the spec.
+    ``structure_constants``. The structure constant c_ij^k is ``structure_constants[i][j][k]``, with indices from 0, for
+    the pairs (i, j) in the spec.
     """
 
     sign: int = 1
@@ -185,11 +186,11 @@ class SolverOptions:
 class Extras:
     """Parts of the generated code that are optional.
 
-    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` is the number of correction
-    terms in the function of this name; 0 leaves the function out. ``without`` are parts to leave out
-    (`phigen.spec.names.PARTS`); ``included`` are parts to include although the profile leaves them out. ``adjoint``
-    adds the transposed derivative of a step and of a run, with respect to state and parameters. ``real`` is the number
-    type of the C, double or float.
+    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` is a number of correction
+    terms: if it is not 0, the function ``modified_hamiltonian`` is added, and computes H plus these terms. ``without``
+    are parts to leave out (`phigen.spec.names.PARTS`); ``included`` are parts to include although the profile leaves
+    them out. ``adjoint`` adds the transposed derivative of a step and of a run, with respect to state and parameters.
+    ``real`` is the number type of the C, double or float.
     """
 
     tangent: bool = False
@@ -222,10 +223,11 @@ class Overrides(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class AverageChoice:
-    """Setting ``average:`` of a run: time averages of the observables ``of``; of all observables if it is empty.
+    """Setting ``average:`` of a run: the time averages to compute.
 
-    Rows from the time ``after`` on are averaged, all rows if it is None. They are divided into at least ``blocks``
-    blocks, from whose means the statistical error follows.
+    ``of`` lists the observables to average; if it is empty, all are averaged. Rows from the time ``after`` on are
+    averaged, all rows if it is None. They are divided into at least ``blocks`` blocks, from whose means the statistical
+    error follows.
     """
 
     after: Fraction | None = None
@@ -364,8 +366,9 @@ class SweepSettings:
     """A sweep: one run, repeated for many values of parameters and initial values. Each repetition is a member.
 
     The members are a grid of the axes ``over``, or a number of ``random`` members, or the rows of a ``file``. ``keep``
-    lists the results to store for each member: words of `phigen.spec.names.KEPT` and statistics of observables.
-    ``frames`` is the number of steps between states that are stored too; 0 for none. ``target`` runs the members.
+    lists the results to store for each member: words of `phigen.spec.names.KEPT` and statistics of observables. If
+    ``frames`` is not 0, states are stored too, one after every ``frames`` steps. ``target`` is the target whose code
+    integrates the members.
     """
 
     name: str

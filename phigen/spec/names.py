@@ -127,9 +127,9 @@ STATISTICS = ("mean", "std", "error")
 #: Representations of an attitude, the rotation of a rigid body, that ``reconstruct:`` may name.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of parts of H. CORRECTED: for near-integrable systems, with a corrector. NEAR_INTEGRABLE:
-#: all for near-integrable systems, with and without a corrector. FLOW_COMPOSITIONS: these and the compositions for two
-#: parts. COMPOSITIONS: all.
+#: Compositions of the flows of parts of H. CORRECTED: those for near-integrable systems with a corrector.
+#: NEAR_INTEGRABLE: all those for near-integrable systems, with and without a corrector. FLOW_COMPOSITIONS:
+#: NEAR_INTEGRABLE, and compositions for splittings into two parts. COMPOSITIONS: all.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),

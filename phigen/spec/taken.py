@@ -38,7 +38,8 @@ winsock2"""
 _HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
 _HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
 
-# Modules that programs import beside a generated module; then modules of the standard library of other Python versions.
+# Modules that programs import beside a generated module. Below, modules that the standard library has in some versions
+# of Python, but not in all.
 _MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
 _OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
 
