@@ -67,9 +67,9 @@ class ModifiedHamiltonian:
         return unit
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
-        """Return the largest change of H̃ with 0, 1, … corrections within ``steps`` steps from x, (corrections + 1,).
+        """Return the largest changes of H̃ with 0, 1, … corrections in a run from x, as an array (corrections + 1,).
 
-        Changes are in units of the energy. Raises `StepError` if a step fails.
+        The run has ``steps`` steps of size h. Changes are in units of the energy. Raises `StepError` if a step fails.
         """
         changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
         if not np.isfinite(changes).all():

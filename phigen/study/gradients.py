@@ -147,7 +147,7 @@ def measured(
     reason = failure or f"the gradient differs from the transpose of the tangent maps by {apart:.1e}"
     yield f"gradient against tangent maps{place}", apart, TRANSPOSED, reason
     slip, failure = _largest(free_level_runs, difference_error)
-    reason = failure or f"the gradient is {slip:.1e} off"
+    reason = failure or f"the gradient differs from finite differences by {slip:.1e}"
     yield f"gradient against differences{place}", slip, DIFFERENCES, reason
 
 

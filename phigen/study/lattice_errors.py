@@ -65,9 +65,9 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
     """Return the work done up to each stored state (frames,), and an estimate of its error.
 
-    The run is repeated step by step, and the power is evaluated after every step. Further steps after the end of the
-    run give short runs as many values as the polynomials need, and a value after a last row inside a step. Raises
-    `StepError` if a step fails before there are enough values.
+    The run is repeated step by step, and the power is evaluated after every step. A polynomial through several values
+    of the power is integrated. Therefore further steps follow after the end of a run that is short, or whose last row
+    is inside a step. Raises `StepError` if a step fails before there are enough values.
     """
     power, solver, start_time = Power(cell), run.solver, float(run.t[0])
     session, powers = solver.started(Beginning(run.x[0], run.h, run.parameters, start_time)), []

@@ -163,8 +163,9 @@ def _without_noise(subject: _Subject) -> _Subject:
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     """Return the check of the observed order of a lattice.
 
-    The order is the logarithm, to the base 2, of the quotient of the errors with steps h and h/2. Of several h, the one
-    with the smallest errors that exceed rounding counts. ``quiet`` says that the noise of the spec was removed.
+    The order is the logarithm, to the base 2, of the quotient of the errors with steps h and h/2. It is measured for
+    several h; the value for the smallest errors above rounding is the result. ``quiet`` says that the noise of the spec
+    was removed.
     """
     name = "observed order, without the noise" if quiet else "observed order"
     step = subject.compilation.program.step.swept
@@ -333,7 +334,7 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         solvers = subject.solvers.values()
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
-        yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
+        yield Check(name, defect, limit, defect <= IDENTITY, f"DΦ π DΦᵀ differs from π∘Φ by {defect:.1e}")
     # Finite differences are computed four times: with two displacements, each in units of fields and in units of values
     # at sites. The smallest deviation counts, since the larger ones are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
@@ -341,7 +342,7 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
     trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
     slip = min(max(small_lattice.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in trials)
     name, limit = f"tangent map against differences {sizes_text}", f"≤ {DIFFERENCES:.0e}"
-    yield Check(name, slip, limit, slip <= DIFFERENCES, f"is not the derivative of the step, {slip:.1e} off")
+    yield Check(name, slip, limit, slip <= DIFFERENCES, f"differs from finite differences of the step by {slip:.1e}")
 
 
 def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
@@ -425,10 +426,10 @@ class _SmallLattice:
         return float(np.abs(slopes @ start_tensor @ slopes.T - image).max()) / size
 
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
-        """Return the largest difference between the tangent map and finite differences of order 6.
+        """Return the largest difference between the tangent map of a step and finite differences of order 6.
 
-        It is relative to the largest entry of the tangent map. Numbers of a state are measured in ``units``, and
-        displaced by ``apart``.
+        The difference is relative to the largest entry of the tangent map. Numbers of a state are measured in
+        ``units``, and displaced by ``apart``.
         """
 
         def step(y: Floats) -> Floats:
@@ -441,10 +442,10 @@ class _SmallLattice:
 
 
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
-    """Return the lattice, and a note on replaced parameters: those that make π infinite because their value is
-    0.
+    """Return the lattice with finite brackets, and a note.
 
-    The note, such as ", m = 0.1 for 0", is added to the name of a check; it is "" if nothing was replaced.
+    Parameters whose value 0 makes π infinite are replaced by other values. The note, such as ", m = 0.1 for 0", is
+    added to the name of a check; it is "" if nothing was replaced.
     """
     with np.errstate(all="ignore"):
         if np.isfinite(_poisson(small_lattice.whole, small_lattice.x, small_lattice.parameters)).all():

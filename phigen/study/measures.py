@@ -16,7 +16,7 @@ from phigen.symbolic.arrays import Floats, evaluate
 #: Relative rounding error of a few operations. Errors up to a few times this are not errors of the method.
 ROUNDING = 4e-16
 
-#: Finite differences are computed with the usual displacements, and with displacements divided by the second factor.
+#: Finite differences are computed several times. The usual displacements are divided by each of these factors.
 DISTANCES = (1.0, 256.0)
 #: If finite differences deviate by more than this fraction of the largest derivative, they are also computed with
 #: displacements in proportion to each coordinate.
@@ -25,7 +25,8 @@ ROUGH = 1e-8
 #: Relative displacement of a coordinate, from which the effect of rounding errors of the state on π is estimated.
 _SHARE = 1e-6
 
-#: Numbers of steps for measurements of the order: 4, 6, 8, 12, 16, 24, … For most numbers the list has the double too.
+#: Numbers of steps for measurements of the order: 4, 6, 8, 12, 16, 24, … Since an order follows from the errors with n
+#: and 2n steps, the list contains 2n for every n except the last two.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 

@@ -21,10 +21,10 @@ _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 class Method:
     """One-step method: ``step(x, h)`` returns the state (DIM,) after a step.
 
-    ``rows(x, h, steps, stride)`` returns the states (rows, DIM) of a run. Both raise `StepError`. ``tangent(x, h)``
-    returns the tangent map (DIM, DIM) of a step, if the code has one. ``step`` and ``rows`` begin at a fixed time;
-    ``later(h)`` returns the method that begins later by h, if the equations depend on the time. ``together(states, h)``
-    makes one step from many states (members, DIM) at once, if possible.
+    ``rows(x, h, steps, stride)`` returns the states (rows, DIM) of a run. If a step fails, ``step`` and ``rows`` raise
+    `StepError`. ``tangent(x, h)`` returns the tangent map (DIM, DIM) of a step, if the code has one. ``step`` and
+    ``rows`` begin at a fixed time; ``later(h)`` returns the method that begins later by h, if the equations depend on
+    the time. ``together(states, h)`` makes one step from many states (members, DIM) at once, if possible.
     """
 
     name: str
@@ -129,8 +129,9 @@ def size_of(x: Floats) -> float:
 def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
     """Return the derivative (DIM, DIM) of a step by central differences of order 6.
 
-    A coordinate is displaced in proportion to its size, but at least to a tenth of the largest coordinate; with
-    ``by_coordinate`` this bound is dropped, for example for momenta of small masses. ``finer`` divides displacements.
+    A coordinate is displaced in proportion to its size, or to a tenth of the size of the largest coordinate if that is
+    more. With ``by_coordinate`` each nonzero coordinate is displaced in proportion to its own size, which suits, for
+    example, momenta of small masses. ``finer`` divides displacements.
     """
     size = size_of(x)
     widths = _WIDTH / finer * np.where(x == 0, 0.1 * size, np.maximum(np.abs(x), 0.0 if by_coordinate else 0.1 * size))

@@ -12,7 +12,7 @@ from phigen.symbolic.arrays import Floats
 
 
 def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """Return the vector field g π∇H, the motion in τ, as a function of a state (DIM,).
+    """Return the vector field g π∇H of the motion in τ, as a function of a state (DIM,).
 
     For a state (DIM + 1,) whose last coordinate is the time t, dt/dτ = g is appended.
     """

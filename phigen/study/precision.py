@@ -20,8 +20,8 @@ COARSER, FINER = 6, 7
 #: ROUNDS: how often a time is measured; the shortest time counts. LEAST_SECONDS: least duration of a measurement, which
 #: may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
-#: Only the beginning of a run is studied. These numbers of steps are tried for it in this order until the errors show
-#: the order of the solver, because the errors may grow too fast in a long run.
+#: Only the beginning of a run is studied, because errors may grow too fast in a long run. These numbers of steps are
+#: tried one after another, until the errors decrease with the step size as the order of the solver predicts.
 SPANS = (4096, 256, 16)
 #: The order is determined from errors between ABOVE_FLOOR times the error of the reference, and ASYMPTOTIC.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02

@@ -56,9 +56,10 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the functions that run the solver, and those ``methods`` that are explicit, in C and double precision.
+    """Return the functions that run the solver and the classical ``methods``, in C and double precision.
 
-    With a monitor, all methods make steps of equal size in τ. Raises `ToolchainError` if the C cannot be compiled.
+    Methods that are implicit are left out. With a monitor, all methods make steps of equal size in τ. Raises
+    `ToolchainError` if the C cannot be compiled.
     """
     from phigen.targets.rendering import render
 

@@ -55,7 +55,7 @@ def strong_order(
 def observed_power(errors: Floats, size: float) -> float:
     """Return the power of the step size with which ``errors`` (LEVELS,) decrease; each step size is half of the last.
 
-    It is infinite if all errors are rounding errors of states of the given ``size``, or one is 0.
+    The power is infinite if an error is 0, or if all errors are rounding errors of states of the given ``size``.
     """
     if not errors.all() or errors.max() <= PATH_ROUNDING * size:
         return np.inf

@@ -409,7 +409,7 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
         limit, is_passed, reason = _approximate(subject, states, defect, largest)
     yield Check("Poisson defect, exact tangent", largest, limit, is_passed, reason, compared)
     slip = max(worst(measures.tangent_error, m) for m in subject.own.values())
-    reason = f"the tangent map is not the derivative of the step, {slip:.1e} off"
+    reason = f"the tangent map differs from finite differences of the step by {slip:.1e}"
     yield Check("tangent map against differences", slip, f"at most {DIFFERENCES:g}", slip <= DIFFERENCES, reason)
     reversal_error = max(worst(measures.reversal, m) for m in subject.own.values())
     symmetric = subject.compilation.symmetric
@@ -451,8 +451,7 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """Return limit, verdict and reason of failure for the check of the Poisson defect of an approximate
-    bi-realisation.
+    """Return limit, verdict and reason of failure for the check of the Poisson defect of an approximate bi-realisation.
 
     If the series of the bi-realisation ends at degree d in p, the defect must decrease like h^(d+1). ``largest`` is the
     largest measured defect.
