@@ -33,8 +33,8 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 def make(store: str, digest: str, number: int) -> tuple[int, int]:
     """Compute the members of a chunk, store their results, and return the numbers of members and of failed members.
 
-    ``digest`` identifies the content of the store, so that a process that knows an older store of this path reads it
-    anew.
+    ``digest`` identifies the content of the store. If this process has read another store at the same path before, it
+    notices the new digest, and reads the new store.
     """
     job, solver = _ready(store, digest)
     plan = job.plan

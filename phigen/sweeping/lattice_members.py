@@ -175,9 +175,10 @@ def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapp
 def energies_at_start(
     job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int
 ) -> tuple[Floats, Floats]:
-    """Return the initial energies of ``count`` members, and the sums of the absolute values of the energies of sites.
+    """Return two arrays (members,) for ``count`` members: initial energies, and magnitudes of their terms.
 
-    Both are arrays (members,), with NaN for members whose values are not allowed. ``varied`` has the varied values.
+    The second array has the sum over the sites of |energy of the site|. Both arrays have NaN for members whose values
+    are not allowed. ``varied`` has the values of the varied quantities.
     """
     energies = np.full((2, count), np.nan)
     for m in range(count):

@@ -57,9 +57,10 @@ class Job:
     spec: str
 
     def backend(self, device: int | None = None) -> Any:
-        """Return the loaded solver, for a device target on the device with this number.
+        """Return the solver, compiled if necessary, and loaded.
 
-        Raises `ToolchainError` if it cannot be compiled.
+        If the target runs on devices (graphics cards), ``device`` is the number of the device. Raises `ToolchainError`
+        if the solver cannot be compiled.
         """
         from phigen import registry
 

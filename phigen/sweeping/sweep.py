@@ -60,10 +60,11 @@ class SweepSetting:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a call: numbers of members that were computed and that failed in this call, and data of the sweep.
+    """Result of a call that computes a sweep.
 
-    ``size`` is the number of all members, ``dims`` has the sizes of the dimensions, ``energy`` the members of the sweep
-    with large energy errors.
+    ``members`` and ``failed`` are the numbers of members that were computed, and that failed, in this call. The other
+    fields describe the whole sweep: ``size`` is the number of its members, ``dims`` has the sizes of its dimensions,
+    ``energy`` describes its members with large energy errors.
     """
 
     members: int
@@ -85,8 +86,8 @@ def made(
     """Compute the members of a sweep that its store does not contain yet; ``started`` receives their number.
 
     ``tell`` receives the numbers of computed and failed members after each chunk. Raises `SpecError`, `FileError` if
-    the store contains another sweep, `LimitError` if the members that are computed at a time do not fit into memory,
-    and `SweepError` if the computation stops.
+    the store contains another sweep, `LimitError` if the chunks that are computed at the same time do not fit into
+    memory, and `SweepError` if the computation stops.
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
@@ -170,7 +171,7 @@ def _members_of(plan: Plan, number: int) -> int:
 
 
 def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int], target: str) -> Plan:
-    """Return the plan of a sweep, whose division into chunks is not chosen yet.
+    """Return the plan of a sweep, before its division into chunks is chosen.
 
     ``columns`` are the names of the columns of a file of members, with their lengths.
     """
