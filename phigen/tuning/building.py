@@ -42,9 +42,9 @@ class Built:
     """A compiled candidate, with its generated files and the properties of its method.
 
     ``kind`` is the chosen kind of bi-realisation or scheme. ``order`` may exceed that of the setting, since symmetric
-    methods have even order. ``exact`` says that a step is a Poisson map to round-off, ``gauged`` that multiples of
-    Casimirs are chosen. ``stages`` is the number of maps of which a step is composed, ``seconds`` the time of the
-    build.
+    methods have even order. ``exact`` says that a step is a Poisson map to round-off, ``gauged`` that the solver
+    subtracts multiples of Casimirs from H. ``stages`` is the number of maps of which a step is composed, ``seconds``
+    the time of the build.
     """
 
     setting: Setting

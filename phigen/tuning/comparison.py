@@ -84,7 +84,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A method to be measured: ``method`` makes runs; ``step`` is its one-step map, None if it has no derivative."""
+    """A method to be measured: ``method`` makes its runs.
+
+    ``step`` makes single steps, for the measurement of the Poisson defect; None if the defect is not measured.
+    """
 
     title: str
     order: int

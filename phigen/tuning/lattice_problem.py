@@ -34,7 +34,7 @@ LATTICE_ROWS = 1024
 
 @dataclass
 class FlatSession:
-    """Session of a lattice solver, which makes single steps, with states flattened to (DIM,).
+    """Session of a lattice solver, for single steps. Its states are flattened to (DIM,).
 
     Its methods are those of `phigen.runtime.session.Course`.
     """
@@ -177,8 +177,7 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """Return the tuning problem of a run of a lattice; ``settings`` are parameters that replace those of the
-    run.
+    """Return the tuning problem of a run of a lattice; ``settings`` are parameters that replace those of the run.
 
     ``step`` and ``span`` are the step size and the duration of the run, both positive; ``direction`` is 1 or −1. A run
     on a large grid is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.

@@ -51,8 +51,8 @@ MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
 MOST_LETTERS = 160
-#: HIGHEST: largest order at which monitors are compared. FEWEST: MOST · FEWEST steps are allowed for every run.
-#: SECONDS: largest duration of a run in seconds.
+#: HIGHEST: largest order at which monitors are compared. FEWEST: a run may have at least MOST · FEWEST steps, even if
+#: the run without a monitor needs fewer than FEWEST. SECONDS: largest duration of a run in seconds.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for the runs, which follow all builds.
 MEASURING = 0.25

@@ -109,8 +109,8 @@ def _converged(
 ) -> tuple[Floats, float, float] | None:
     """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the states.
 
-    The step is halved until a halving changes the states little, or more than the halving before, or until the time
-    ``until``. The result is None if steps of all sizes fail.
+    The step is halved until a halving changes the states little, until it changes them more than the previous halving
+    did, or until the time ``until``. The result is None if steps of all sizes fail.
     """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None

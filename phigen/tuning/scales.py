@@ -13,8 +13,8 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: The time span over which methods are measured with several step sizes contains as many steps of the size in the run
-#: as take PIECE_SECONDS seconds of processor time, but at least 500 and at most PIECE_STEPS.
+#: PIECE_SECONDS: processor time, in seconds, in which the method of the spec integrates over the time span of the
+#: search, with the step of the run. PIECE_STEPS: largest number of these steps; their least number is 500.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.

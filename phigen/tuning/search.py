@@ -18,13 +18,13 @@ FAILURES = 16
 BEYOND = 1 / 30
 #: Steps are chosen for this fraction of the accuracy, since the error of a longer run is slightly larger.
 AIM = 0.8
-#: Smaller steps may cost less, because they need fewer iterations. The search for a cheaper step ends when the cost
+#: The search for a cheaper step goes on to smaller steps, which may need fewer iterations. It ends when the cost
 #: exceeds the least cost by this factor.
 DEARER = 1.25
 #: A bi-realisation is not tried at other orders if its cost exceeds the least cost by more than this factor.
 KEEP = 3.0
-#: If halving the step divides the error by less than this, the error is rounding error, provided that it is below
-#: SMALL or this number of rounding errors of one step.
+#: A scan has reached rounding error if halving the step divides the error by less than GAIN, and if the error is below
+#: SMALL or below MANY_ROUNDINGS times the rounding error of one step.
 GAIN, SMALL, MANY_ROUNDINGS = 1.5, 1e-9, 1000
 
 

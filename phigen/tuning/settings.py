@@ -34,8 +34,8 @@ GAUSS_ORDERS = (4, 8, 12, 16)
 #: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
 AUTO = "auto scheme"
 
-#: Compositions that are tried for near-integrable H = A + εB, with their orders. Each composition without a corrector
-#: has another order of the error in ε and h. The two with a corrector have the cheapest steps.
+#: Compositions that are tried for near-integrable H = A + εB, with their orders. Those without a corrector differ in
+#: the powers of ε and h in their errors. The two with a corrector have the cheapest steps.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),

@@ -27,8 +27,8 @@ CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: FINALISTS: number of methods, the best ones, whose steps are confirmed and timed. BEHIND: largest cost of these
 #: methods relative to the best one. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: After this share of the time budget, methods are no longer tested in longer runs. If none has passed this test yet,
-#: the tests continue until one passes, with one step for each method.
+#: Longer runs that test methods begin only before this share of the time budget is used up. If no method has passed the
+#: test by then, further methods are tested, with one step size each, until one passes.
 CONFIRMED = 1.0
 #: Share of the time budget after which no further round of timings begins. A round takes about a tenth of the budget.
 TIMED = 1.1
@@ -108,7 +108,7 @@ class Tuning:
 
     @property
     def closest(self) -> tuple[Curve, Point]:
-        """The smallest measured error of phigen methods, as the curve of a method and the point on it."""
+        """The curve and the point on it with the smallest error that was measured for a method of phigen."""
         measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
         return min(measured_points, key=lambda pair: pair[1].error)
 
@@ -146,9 +146,10 @@ def tune(
 
 
 def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
-    """Return the gains of monitors over the time span of the search.
+    """Try monitors in runs over the time span of the search, and return the results.
 
-    None if the spec has a monitor, if monitors do not apply, or if the speed of the motion varies little.
+    A monitor is useful if runs with it need fewer steps for the same energy error. The result is None if the spec has a
+    monitor, if monitors do not apply, or if the speed of the motion varies little.
     """
     compilation, problem = tuner.compilation, tuner.problem
     spec, setting = compilation.spec, current.setting
