@@ -157,9 +157,10 @@ class _Compiled(ABC):
 
     @property
     def stage(self) -> Order:
-        """Order and number of terms of one map of which a step is composed: order 2 and one term.
+        """Order and number of terms of each map of which a step is composed.
 
-        If a step is a single map, these are the order and the number of terms of the method.
+        If a step is a single map, these are the order and the number of terms of the method. Otherwise each map has
+        order 2 and one term.
         """
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
 
@@ -231,8 +232,9 @@ class _CompiledSystem(_Compiled, ABC):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Call the function for the scheme of this compilation (series, splitting or gauss) with it, and return the
-        result."""
+        """Call one of the three functions, that for the scheme of this compilation, with this compilation as its
+        argument. Return the result of the function.
+        """
 
     @property
     def known_system(self) -> System | None:

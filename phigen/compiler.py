@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Order of the series whose operations are counted for a lower bound of the cost of a series of higher order. Building
-#: the series of higher order itself would take long.
+#: Order of a series that is built to estimate costs: its operations are counted, as a lower bound for a series of
+#: higher order, which would take long to build.
 PREVIEW_ORDER = 4
 
 #: Least number of sites of a lattice that is recognised in a spec with the equations of all sites. Specs with fewer
@@ -300,7 +300,11 @@ def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mappin
     alternatives = [f"{_expected(c) / least:.1f} times the time for {s}" for s, c in compilations.items() if s != best]
     alternatives += [f"{s} does not apply" for s in failures]
     alternatives += ["more for series"] * ("series" not in {*compilations, *failures} and bool(compilations))
-    return f"{best}; expected: {', '.join(alternatives)}" if alternatives else f"{best}, since options apply to it only"
+    return (
+        f"{best}; expected: {', '.join(alternatives)}"
+        if alternatives
+        else f"{best}, the only scheme with the options of the spec"
+    )
 
 
 def _expected(compilation: Compilation) -> float:
@@ -350,9 +354,10 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """Return H as a sum of parts, each with its flow.
 
-    With the key ``coordinates_from``, there is a part for each body. Some parts have a known motion as a whole, such as
-    a Kepler motion. Their exact flow is not used with a monitor (dt = g dτ), nor if such a part would be the only one
-    and the spec names a composition. Free rigid bodies may be parts if `_turns_bodies` allows it.
+    With the key ``coordinates_from``, there is a part for each body. Some parts have a motion that is known as a whole,
+    such as a Kepler motion. With a monitor (rescaled time: dt = g dτ), these motions are not used. They are not used
+    either if one of them would be the flow of all of H although the spec names a composition. Free rigid bodies may be
+    parts if `_turns_bodies` allows it.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)

@@ -170,8 +170,9 @@ class _Problem:
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
         """Return a step size, and whether it reaches the tolerances.
 
-        It does if steps of half the size change the last state by less than the tolerances. If no step size does, the
-        smallest one that was tried is returned, and False. Raises `StepError` if the last attempt fails.
+        The step size is halved until the last halving changes the last state by no more than the tolerances. If this
+        does not happen, the smallest step size that was tried is returned, and False. Raises `StepError` if the last
+        attempt fails.
         """
         h, previous, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
         for _ in range(_MAX_HALVINGS):

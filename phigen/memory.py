@@ -1,6 +1,7 @@
 """Checks that arrays over the sites of a lattice fit into memory, before they are allocated.
 
-Without a check, Linux lets a process allocate more memory than there is, and kills the process when it writes to it.
+Without a check, Linux lets a process allocate more memory than there is. It kills the process later, when the process
+writes to this memory.
 """
 
 from __future__ import annotations

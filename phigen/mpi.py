@@ -36,8 +36,8 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: STRETCH is the number of steps between two checks that all values are finite. If a single step fails, it and the next
-#: steps, FAR_STEPS in all, use functions valid for all arguments. These numbers are those of
+#: STRETCH is the number of steps between two checks that all values are finite. If a single step fails, FAR_STEPS steps
+#: from this step on use functions that are valid for all arguments. These numbers are those of
 #: templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
@@ -130,7 +130,9 @@ class DistributedLattice:
                 hint = (
                     "integrate in one process; or integrate a number of whole steps, and continue from the last state"
                 )
-                raise TypeError(f"{name} is not available on several processes, whose rows are whole steps: {hint}")
+                raise TypeError(
+                    f"{name} is not available on several processes, which store rows after whole steps only: {hint}"
+                )
         if checkpoints and not output:
             raise ValueError("checkpoints= needs output=, the file with the earlier frames of an interrupted run")
         paths = Path(output) if output else None, Path(checkpoints) if checkpoints else None

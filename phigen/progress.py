@@ -13,7 +13,8 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Stage of a compilation, a context manager. ``done`` of ``total`` parts of the work of the stage are done.
+    """Context manager for a stage of a compilation. The stage has completed ``done`` of ``total`` parts of its
+    work.
 
     ``total`` is 0 if the number of parts is unknown. ``began`` is the time at which the stage started.
     """

@@ -36,8 +36,8 @@ MAX_SWEEPS = 100
 #: Thresholds, in double precision, at which the iterations for a step and for a linear equation end.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
-#: Data of a run between two steps: the state x, its compensation term, and the increments of the last step, expressed
-#: in the frame of x.
+#: Data of a run between two steps: the state x, its compensation term, and the increments of the last step, converted
+#: to increments of a step that starts at x.
 Carry = tuple[Any, Any, Any]
 
 
@@ -161,10 +161,10 @@ class Collocation:
         return jnp.concatenate([jnp.broadcast_to(size, (self.points.plain,)), ones])[:, None]
 
     def _from_the_end(self, x: Any, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the increments of a step from ``x``, converted to the frame of the end of the step, for the next
-        prediction.
+        """Return the increments of the step from ``x``, converted to increments of a step that starts at the end of
+        this step.
 
-        ``end`` has the values of the unknowns at the end.
+        The next step is predicted from these increments. ``end`` has the values of the unknowns at the end of the step.
         """
         if self._traced_value is None:
             return moves

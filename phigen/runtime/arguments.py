@@ -37,7 +37,8 @@ class Beginning:
     ``values``.
 
     ``draws`` selects the random numbers. ``first`` are the values of the initial attitude and position, None for the
-    default. ``level`` is the energy level e of a lattice with a monitor (dt = g dτ); None stands for −H(x).
+    default. ``level`` is the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); None stands for
+    −H(x).
     """
 
     x: Floats
@@ -52,8 +53,8 @@ class Beginning:
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
     """Return the energy level e that the argument ``gauge`` sets, and remove this argument.
 
-    Only lattices with a monitor (dt = g dτ) have this argument. Returns None if it is missing; e is then −H of the
-    initial state. Raises `ValueError` unless the value is one finite number.
+    Only lattices with a monitor (rescaled time: dt = g dτ) have this argument. Returns None if it is missing; e is then
+    −H of the initial state. Raises `ValueError` unless the value is one finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None
@@ -200,8 +201,9 @@ def times(
 
 
 def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) -> dict[str, Any]:
-    """Return parameters from a mapping and from keyword arguments in one dict. Raises `TypeError` for a name in
-    both."""
+    """Return parameters from a mapping and from keyword arguments in one dict. Raises `TypeError` for a name that is in
+    the mapping and among the keyword arguments.
+    """
     repeated = sorted(set(mapped or {}) & set(by_keyword))
     if repeated:
         raise TypeError(f"parameter {repeated[0]!r} is given twice")
@@ -235,7 +237,9 @@ def parameters(
 
 
 def state(x: ArrayLike, argument: str, interface: Interface) -> Floats:
-    """Return a copy of one state (DIM,). Raises `TypeError` and `ValueError` for values that are not a state."""
+    """Return a copy of one state (DIM,). Raises `TypeError` for values that are not numbers, and `ValueError` for other
+    shapes and for values that are not finite.
+    """
     copy = states(x, argument, interface)
     if copy.ndim != 1:
         expected = f"({interface.dimension},)"
@@ -244,8 +248,9 @@ def state(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def members(x: ArrayLike, argument: str, interface: Interface) -> Floats:
-    """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` and `ValueError` for other
-    values."""
+    """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` for values that are not numbers,
+    and `ValueError` for other shapes and for values that are not finite.
+    """
     copies = states(x, argument, interface)
     if copies.ndim != 2:
         raise ValueError(f"{argument} must have shape (members, {interface.dimension}), not {copies.shape}")
@@ -273,7 +278,7 @@ def ensemble(
     else:
         start = members(X0, "X0", interface)
     shape = (len(start),)
-    # To check the names of parameters, one number stands for each array.
+    # Arrays over members are checked below. Here only their names are checked, so each array is replaced by a number.
     shared_values: list[dict[str, Any]] = [
         {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, by_keyword)
     ]

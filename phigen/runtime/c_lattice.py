@@ -83,8 +83,8 @@ MIN_TAPE_VALUES = 1 << 18
 #: Least number of stored states for which a tape has room; the reverse pass recomputes the steps between them.
 MIN_CHECKPOINTS = 8
 
-#: Number of steps over which the size of the tape for one step is averaged, since several steps may share one stored
-#: state.
+#: Number of steps by which the tape is measured: the space for one step is the mean over these steps, since several
+#: steps may share one stored state.
 MEASURED_STEPS = 64
 
 #: Largest size of a tape in bytes (64 MiB), unless `MIN_TAPE_VALUES` or `MIN_CHECKPOINTS` needs more.
@@ -257,15 +257,21 @@ class CLatticeSession:
         return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, if a monitor (dt = g dτ) makes steps equal in τ; else {}."""
+        """Return the energy level and the physical time, if a monitor (rescaled time: dt = g dτ) makes steps equal in
+        τ; else {}.
+        """
         return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ, not in t."""
+        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ, not
+        in t.
+        """
         return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor (dt = g dτ); by default e is −H of the initial state."""
+        """Set the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); by default e is −H of the
+        initial state.
+        """
         self._set_clock(np.array([level, *self._clock()["passed"][1:]]))
 
     def _set_clock(self, clock: Floats) -> None:
@@ -288,7 +294,8 @@ class CLatticeSession:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
+        finite.
         """
         self._move("set_state", x)
 
@@ -312,9 +319,11 @@ class CLatticeSession:
     # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Declare that this solver has the planes from ``first`` on of a larger lattice with ``planes`` planes.
+        """Declare that this lattice is a part of a larger lattice with ``planes`` planes, where its first plane is
+        plane ``first``.
 
-        Each site then draws the random numbers that it has in the larger lattice.
+        A plane is the set of all sites with one index of the first axis. With noise, each site then draws the random
+        numbers that it has in the larger lattice.
         """
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
@@ -382,10 +391,10 @@ class CLattice:
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order. Without noise, one more sweep follows: it makes the last sweep of a
-        step and the first sweep of the next step at once.
+        """Return the sweeps of a step in order, followed by one more sweep if there is no noise.
 
-        Raises `ValueError` if the C has no caller-driven stepping.
+        This additional sweep replaces two: it does the work of the last sweep of a step and of the first sweep of the
+        next step. Raises `ValueError` if the C has no caller-driven stepping.
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(

@@ -23,8 +23,9 @@ _ALIGNMENT = 64  # bytes: the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):
-    """Cotangents that a reverse pass updates: those of the state, of the parameters, and of the energy level e of a
-    monitor."""
+    """Cotangents that a reverse pass updates: those of the state and of the parameters and, with a monitor (rescaled
+    time: dt = g dτ), that of the energy level e.
+    """
 
     state: Floats
     parameters: Floats

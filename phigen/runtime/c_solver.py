@@ -128,7 +128,8 @@ class CSolver:
     def _expect_parameters(self, members: Members) -> None:
         """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
 
-        With a monitor g (dt = g dτ) nothing is checked: whether g is positive depends on an initial state.
+        With a monitor g (rescaled time: dt = g dτ) nothing is checked: whether g is positive depends on an initial
+        state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -291,8 +292,9 @@ class CSolver:
         """Whether the derivatives of all members can be computed together, by one call of C for each segment of the
         run.
 
-        A common computation is not possible for several segments if H depends on the time or if Casimirs are subtracted
-        from H: the C would choose the time and the multiples of Casimirs anew at the start of each segment.
+        This is not possible for several segments if H depends on the time, or if Casimirs are subtracted from H. Then
+        the initial time, or the multiples of the Casimirs, hold for the whole run, but the C would set them again at
+        each segment.
         """
         if not hasattr(self._c, "pullback_each"):
             return False
@@ -406,7 +408,8 @@ class CSolver:
         return result.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
-        # A C struct cannot be empty: without parameters it has one unused char, and one zero is large enough for it.
+        # A C struct cannot be empty. Without parameters, the struct has one unused char. The array that is passed then
+        # has one zero, since it must have at least the size of a char.
         return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:

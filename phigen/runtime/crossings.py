@@ -350,8 +350,9 @@ class CrossingFinder(Generic[C]):
         return None
 
     def _clock(self, session: C, counted_time: float) -> float:
-        """Return the physical time of a session if a monitor (dt = g dτ) makes steps equal in τ; else
-        ``counted_time``."""
+        """Return the physical time of a session if a monitor (rescaled time: dt = g dτ) makes steps equal in τ; else
+        ``counted_time``.
+        """
         elapsed = getattr(session, "time", lambda: math.nan)()
         return counted_time if math.isnan(elapsed) else float(elapsed)
 

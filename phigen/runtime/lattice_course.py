@@ -1,4 +1,6 @@
-"""Integrations of lattices that can be copied. Sections, retries, and ends and rows inside a step need copies."""
+"""Integrations of lattices that can be copied. A copy is needed to locate a crossing, to repeat a step in smaller
+steps, and to end a run or store a row inside a step.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +77,9 @@ class LatticeCourse:
         return self.sites.state()
 
     def time(self) -> float:
-        """The physical time since the start if a monitor (dt = g dτ) makes steps equal in τ; else NaN."""
+        """The physical time since the start if a monitor (rescaled time: dt = g dτ) makes steps equal in τ;
+        else NaN.
+        """
         return self.sites.time() if self.solver.interface.monitored else math.nan
 
     def element(self) -> Floats:
@@ -107,7 +111,8 @@ class LatticeCourse:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
+        finite.
         """
         self._anchor = {}
         self.sites.place(x)
@@ -120,8 +125,8 @@ class LatticeCourse:
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Replace the parameters. The state, the time and the random numbers are unchanged.
 
-        Compensation terms and predictors are dropped, as at a new start. With a monitor (dt = g dτ), the energy level e
-        becomes −H of the state. Raises `StepError` if no step is possible with the parameters.
+        Compensation terms and predictors are dropped, as at a new start. With a monitor (rescaled time: dt = g dτ), the
+        energy level e becomes −H of the state. Raises `StepError` if no step is possible with the parameters.
         """
         sites, steps, draws = self.sites, self.steps, self.at.draws
         clock = Clock(self._clock.after(steps), self._clock.h, steps)

@@ -21,12 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Positions of the rows of a run. Row k is reached by ``whole[k]`` steps and a shorter step of size
-    ``part[k]``.
+    """Positions of the rows of a run. Row k is reached by ``whole[k]`` steps and a shorter step of size ``part[k]``.
 
     ``part`` is 0 for rows at whole steps. The first row is the start. If there is an ``end``, it makes the last row.
-    With a monitor (dt = g dτ) and rows at given times, only the times ``spans`` (rows,) after the start are known
-    beforehand; the number of steps before each row is counted during the run.
+    With a monitor (rescaled time: dt = g dτ) and rows at given times, only the times ``spans`` (rows,) after the start
+    are known beforehand; the number of steps before each row is counted during the run.
     """
 
     whole: NDArray[np.int64]
@@ -92,10 +91,10 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """A section: those zeros of a function ``g`` of the observables at which g changes its sign in
+    """Section of a run: the zeros at which a function ``g`` of the observables changes its sign in the
     ``direction``.
 
-    ``text`` is the formula of g.
+    The direction is ``rising``, ``falling`` or ``both``; ``text`` is the formula of g.
     """
 
     g: Function

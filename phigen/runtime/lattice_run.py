@@ -24,8 +24,7 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
-#: Largest number of values in the states that are stored together (32 MB) when crossings are searched in a block of
-#: steps.
+#: Crossings are searched in blocks of steps. This is the largest number of values in all states of a block (32 MB).
 MOST_FOLLOWED = 1 << 22
 
 
@@ -143,8 +142,8 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """Return the object that finds crossings of the section. If ``arrays`` come from a checkpoint, they restore its
-        state.
+        """Return the object that finds crossings of the section. If ``arrays`` come from a checkpoint, the object
+        continues from them.
         """
         plan, section = self.plan, self.plan.section
         assert section

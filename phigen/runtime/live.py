@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 class LiveSession:
-    """A trajectory at its present state, made by `Solver.session`.
+    """A trajectory that the caller advances step by step, made by `Solver.session`.
 
-    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name),
-    ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to ``x``
-    change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters` changes
-    parameters. With a monitor (dt = g dτ), each of these changes sets the energy level e to −H. ``copy()`` returns an
-    independent session. A session that was pickled and loaded continues with the same bits.
+    Properties of its present state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
+    name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to
+    ``x`` change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters`
+    changes parameters. With a monitor (rescaled time: dt = g dτ), each of these changes sets the energy level e to −H.
+    ``copy()`` returns an independent session. A session that was pickled and loaded continues with the same bits.
     """
 
     def __init__(
@@ -80,8 +80,8 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Store new parameters and the clock ``begin``. Without a monitor (dt = g dτ), time is counted by this clock
-        from now on.
+        """Store new parameters and the clock ``begin``. Without a monitor (rescaled time: dt = g dτ), time is counted
+        by this clock from now on.
         """
         self.parameters = values
         if not self.solver.interface.monitored:
@@ -184,7 +184,7 @@ class LiveSession:
 
 
 class LiveLattice(LiveSession):
-    """A trajectory of a lattice at its present state, made by `LatticeSolver.session`.
+    """A trajectory of a lattice that the caller advances step by step, made by `LatticeSolver.session`.
 
     ``x`` has the shape (coordinates, *sizes), and a Casimir of each site is an array (*sizes). Methods and properties
     are those of `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.

@@ -26,9 +26,9 @@ class Piece:
     """A piece of an integration: its rows, and the crossings of a section that occurred in it.
 
     ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step; ``x``
-    (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). With a monitor (dt = g dτ),
-    ``passed`` (rows,) is the physical time since the start, else NaN. ``turned`` (rows, numbers) are attitudes and
-    positions.
+    (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). With a monitor (rescaled time: dt
+    = g dτ), ``passed`` (rows,) is the physical time since the start, else NaN. ``turned`` (rows, numbers) are attitudes
+    and positions.
     """
 
     numbers: Floats
@@ -114,11 +114,12 @@ def march_at(
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
 ) -> Iterator[Piece]:
-    """Advance a session to ``steps`` steps, and yield the states at the times ``spans`` after the start, in pieces.
+    """Advance a session to ``steps`` steps, and yield the states at the times ``spans`` after the start, in
+    pieces.
 
     The session makes whole steps; a copy of it makes the shorter step to a state inside a step. ``see_tangent``
     receives the derivatives of the whole steps. Steps after the last time yield pieces without rows. If a step fails,
-    `BackendError` is raised after the piece with the states before.
+    `BackendError` is raised after the piece with the states before that step.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []

@@ -54,8 +54,9 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def _begin(self) -> None:
-        """Initialise the physical time of a lattice with a monitor (dt = g dτ). Raises `ValueError` if g ≤ 0 at the
-        start."""
+        """Initialise the physical time of a lattice with a monitor (rescaled time: dt = g dτ). Raises `ValueError` if g
+        ≤ 0 at the start.
+        """
         if hasattr(self._module, "_begin"):
             self._module._begin(self._sites, self._x)
 
@@ -123,15 +124,21 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, if a monitor (dt = g dτ) makes steps equal in τ; else {}."""
+        """Return the energy level and the physical time, if a monitor (rescaled time: dt = g dτ) makes steps equal in
+        τ; else {}.
+        """
         return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ, not in t."""
+        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ, not
+        in t.
+        """
         return float(sum(self._sites.clock))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor (dt = g dτ); by default e is −H of the initial state."""
+        """Set the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); by default e is −H of the
+        initial state.
+        """
         self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -146,7 +153,8 @@ class NumpyLatticeSession:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
+        finite.
         """
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())

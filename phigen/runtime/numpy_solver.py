@@ -65,9 +65,7 @@ class AttitudeState(NamedTuple):
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Return the name that a saved session gives to one of two arrays, from which a stage predicts its next
-    solution.
-    """
+    """Return the name, in a saved session, of one of the two arrays from which a stage predicts its next solution."""
     return f"memory_{stage}_{part}"
 
 
@@ -119,7 +117,7 @@ class NumpySession:
 
     def kick(self, change: Floats) -> None:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
-        if hasattr(self._module, "_with_new_step"):  # the last step still serves for the prediction, from the new state
+        if hasattr(self._module, "_with_new_step"):  # the last solution still predicts the next one
             self._memory = [self._module._with_new_step(pair, 1.0) for pair in self._memory]
 
     def _stand(self, x: Floats, carry: Floats) -> None:
@@ -184,7 +182,7 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps between the corrector of the method and its inverse.
+        """Apply the corrector of the method, make steps, and apply the inverse of the corrector.
 
         The corrector is a map before the first step; its inverse is applied after the last step. If no step succeeds,
         or if one of these two maps fails, the state is unchanged.

@@ -1,7 +1,7 @@
 """Runs that a spec names, for `Solver.run` and `LatticeSolver.run`: their settings, ends and rows.
 
-`changed` returns a run of a spec with other settings. `rows_of` makes the rows of a run of an ordinary system that
-`Solver.integrate` cannot make: runs that stop at a zero of a function, and rows at given times.
+`changed` returns a run of a spec with other settings. `rows_of` integrates two kinds of runs of ordinary systems for
+which `Solver.integrate` has no arguments: runs that stop at a zero of a function, and runs with rows at given times.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fr
     forwards = run.step > 0
     ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
     if not ordered:
-        raise ValueError("at: there are no times")
+        raise ValueError("at must have at least one time")
     if (ordered[0] < run.start) if forwards else (ordered[0] > run.start):
         raise ValueError(f"at: {float(ordered[0])!r} is before the start, {float(run.start)!r}")
     if known_end:

@@ -47,7 +47,8 @@ class Followed(Course, Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ; else NaN.
+        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ;
+        else NaN.
 
         Without a monitor, the time follows from the number of steps.
         """
@@ -67,8 +68,8 @@ class Session(Followed, Protocol):
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         """Replace all parameters; state, time, attitude and random numbers are unchanged.
 
-        With a monitor (dt = g dτ), the energy level e becomes −H. Raises `BackendError` for values that are not
-        admissible.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H. Raises `BackendError` for values that
+        are not admissible.
         """
         ...
 
@@ -93,7 +94,8 @@ class Session(Followed, Protocol):
         ...
 
     def placed(self, x: Floats) -> Self:
-        """Return a copy, with the state ``x`` (DIM,), of a session that has made no step.
+        """Return a copy of this session with the state ``x`` (DIM,). This session must not have made a step
+        yet.
 
         The gauge (the multiples of Casimirs that are subtracted from H) is not chosen again for x.
         """
@@ -102,7 +104,8 @@ class Session(Followed, Protocol):
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (DIM,); time, step number and parameters are unchanged.
 
-        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if ``x`` is not admissible.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if ``x`` is
+        not admissible.
         """
         ...
 

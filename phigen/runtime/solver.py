@@ -41,10 +41,10 @@ _ADVICE = {
 class Marks:
     """Data of the rows of a trajectory, in addition to the states.
 
-    ``tau`` (rows,) is h times the number of steps. With a monitor (dt = g dτ) this is the rescaled time τ, and
-    ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and positions.
-    ``steps`` is the number of all steps. ``retried`` are the numbers of those steps that failed and were repeated as
-    smaller steps.
+    ``tau`` (rows,) is h times the number of steps. With a monitor (rescaled time: dt = g dτ) this is the rescaled time
+    τ, and ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and
+    positions. ``steps`` is the number of all steps. ``retried`` are the numbers of those steps that failed and were
+    repeated as smaller steps.
     """
 
     tau: Floats
@@ -101,10 +101,10 @@ class Solver(Named[Backend, Interface]):
         """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), and return the trajectory of every ``stride``-th state
         and the last.
 
-        A negative ``h`` integrates backwards in time; with a monitor (dt = g dτ), ``h`` is a step in τ. ``t0`` is the
-        time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of ``steps``,
-        the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry smaller
-        steps; together they are another map than one whole step, but also a Poisson map, and keep the Casimirs.
+        A negative ``h`` integrates backwards in time; with a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ.
+        ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of
+        ``steps``, the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry
+        smaller steps; together they are another map than one whole step, but also a Poisson map, and keep the Casimirs.
         ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by default the identity
         and the origin.
 
@@ -199,7 +199,7 @@ class Solver(Named[Backend, Interface]):
     def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
         """Return the trajectory of a run that ends at a zero of a function, or has rows at given times.
 
-        `integrate` cannot make such rows.
+        `integrate` has no arguments for a run of either kind.
         """
         names = self.interface
         stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None
@@ -484,8 +484,9 @@ class Solver(Named[Backend, Interface]):
         ``threads`` is explained at `ensemble`.
 
         Derivatives are exact to round-off. The gauge (the multiples of Casimirs that are subtracted from H) is held
-        fixed. With a monitor (dt = g dτ), the energy level e = −H(x0) is differentiated by x0. There are no derivatives
-        of times and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        fixed. With a monitor (rescaled time: dt = g dτ), the energy level e = −H(x0) is differentiated by x0. There are
+        no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without
+        ``adjoint=True``.
         """
         values = arguments.together(parameters, by_keyword)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)

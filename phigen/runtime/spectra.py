@@ -35,8 +35,8 @@ class DynamicSpectrum:
 
     ``values`` (*sizes, frequencies) are S over the wave numbers ``q`` of each of the ``axes`` and the frequencies
     ``omega``. Wave numbers are in radians per site, in ascending order from −π; frequencies are ascending too. A wave
-    cos(qr − ωt) contributes at (q, ω) and (−q, −ω). The sum of all values is the mean over sites and times of Σ f², the
-    sum over the coordinates; the window in time weights this mean.
+    cos(qr − ωt) contributes at (q, ω) and (−q, −ω). The sum of all values is the mean of Σ f² over sites and times,
+    where Σ runs over the coordinates f. The Hann window weights the times in this mean.
     """
 
     q: tuple[Floats, ...]
@@ -210,8 +210,8 @@ def expect_frames(t: Floats, h: float, after: float | None) -> None:
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return those of the times ``t`` that the run reaches at the time ``after`` or later; if h < 0, these are smaller
-    times.
+    """Return the times in ``t`` that the run reaches at the time ``after`` or later. If h < 0, the run goes backwards,
+    so these are the times up to ``after``.
     """
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]

@@ -1,7 +1,7 @@
 """States at given times, each reached by one shorter step of the same method from a nearby state.
 
-A step of any size is a Poisson map and keeps the Casimirs. With a monitor (dt = g dτ), steps have a given size in τ;
-the secant method finds the size in τ of the step that ends at a given time t, up to rounding.
+A step of any size is a Poisson map and keeps the Casimirs. With a monitor (rescaled time: dt = g dτ), steps have a
+given size in τ; the secant method finds the size in τ of the step that ends at a given time t, up to rounding.
 """
 
 from __future__ import annotations

@@ -117,7 +117,7 @@ class Trajectory:
 
         A ``.csv`` has the columns ``t,x1,…,energy,C…`` and one line per row; every float reads back as the same float.
         A ``.npz`` has the arrays t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME
-        as scalars. With a monitor (dt = g dτ), a column or array ``tau`` follows t.
+        as scalars. With a monitor (rescaled time: dt = g dτ), a column or array ``tau`` follows t.
         """
         write(path, self.columns(), self.rows(), self.scalars())
 

@@ -201,7 +201,9 @@ def test_times_of_a_spec_are_those_of_the_command_line(rotors, cli, spec):
 def test_processes_refuse_parts_of_steps():
     lattice = object.__new__(DistributedLattice)
     lattice.solver = phigen.compile(phigen.spec.loads(ROTORS), target="numpy")
-    with pytest.raises(TypeError, match="until is not available on several processes, whose rows are whole steps"):
+    with pytest.raises(
+        TypeError, match="until is not available on several processes, which store rows after whole steps only"
+    ):
         lattice.integrate(np.zeros((2, 5)), 0.1, 4, until=3)
 
 

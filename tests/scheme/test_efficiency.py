@@ -54,7 +54,7 @@ OF_SERIES = ("terms: 3\n", "birealisation: cayley\n", "modified_hamiltonian: 1\n
 def test_options_of_the_series_choose_it(option):
     compilation = compile_text(f"{BODY}{option}scheme: auto\n", None)
     assert compilation.scheme_name == "series"
-    assert compilation.choice == "series, since options apply to it only"
+    assert compilation.choice == "series, the only scheme with the options of the spec"
 
 
 def test_schemes_that_do_not_apply_are_left_out():

@@ -176,8 +176,8 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the compiled kernels for members that share their coefficients (``common``) or, otherwise, each have
-        their own.
+        """Return the compiled kernels: with ``common`` those for members that share their coefficients, else those for
+        members that each have coefficients of their own.
         """
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}

@@ -62,8 +62,9 @@ class DeviceLattice(NumpyLattice):
 
     @cached_property
     def monitoring(self) -> Any:
-        """The generated NumPy module that computes the durations of flows, if a monitor (dt = g dτ) makes steps equal
-        in τ."""
+        """The generated NumPy module that computes the durations of flows, if a monitor (rescaled time: dt = g dτ)
+        makes steps equal in τ.
+        """
         return monitoring_module(self._text, self.interface.name)
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
@@ -74,9 +75,7 @@ class DeviceLattice(NumpyLattice):
         rows += [launch.outputs for launch in launches.others.values()]
         largest = np.iinfo(np.int32).max // max(rows)
         if np.prod(sizes, dtype=float) > largest:
-            raise DeviceError(
-                f"{interface.name}: {sizes} are more than {largest} sites, the most that 32 bits can number"
-            )
+            raise DeviceError(f"{interface.name}: {sizes} are too many sites; 32 bits can number {largest}")
         if self._of_sizes[0] != sizes:
             self._of_sizes = sizes, {}
         real = np.float32 if interface.single else np.float64

@@ -1,4 +1,4 @@
-"""Lattices on devices with a monitor (dt = g dτ).
+"""Lattices with a monitor (rescaled time: dt = g dτ), integrated on devices.
 
 The duration of each flow follows from the energy of a part of H, which the device sums over the sites.
 """
@@ -15,9 +15,9 @@ from phigen.runtime.modules import load_module
 
 
 class MonitoredSession(DeviceLatticeSession):
-    """A session of a lattice with a monitor (dt = g dτ): steps are equal in τ, not in time t.
+    """A session of a lattice with a monitor (rescaled time: dt = g dτ): steps are equal in τ, not in time t.
 
-    The device sends one number for each flow, on which the duration of the flow depends.
+    The duration of a flow depends on one number, which the device sends to the host.
     """
 
     def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
@@ -31,8 +31,8 @@ class MonitoredSession(DeviceLatticeSession):
         """Do nothing. The energy level is computed at the end of ``__init__``, when the arrays on the device exist."""
 
     def _hold_level(self) -> None:
-        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g (dt = g dτ) is not positive
-        there.
+        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g (rescaled time: dt = g dτ)
+        is not positive there.
         """
         with np.errstate(all="ignore"):
             try:
