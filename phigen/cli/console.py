@@ -134,7 +134,7 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[s
 
 
 def indented(lines: Sequence[str]) -> list[str]:
-    """Return the lines, each indented by two spaces, as the lines below the first line of a message are."""
+    """Return the lines with an indent of two spaces, like that of the second and later lines of a message."""
     return [f"  {line}" for line in lines]
 
 

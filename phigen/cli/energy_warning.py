@@ -33,8 +33,8 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
     """Return the warning about the energy error of a run of an ordinary system; "" if no warning is necessary.
 
     If forces act or H depends on the time, the error is that of the energy balance, H minus the work done. There is no
-    warning if the integral for the work is too inaccurate: if its estimated error is not small compared with the energy
-    error, or so large that the estimate itself means nothing.
+    warning if the integral for the work is too inaccurate. This is the case if its estimated error is not small
+    compared with the energy error, or is so large that the estimate itself means nothing.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < min(energy.error / 2, LARGE_ENERGY_ERROR)
@@ -92,7 +92,7 @@ def sweep_warning(count: int, members: int, largest: float, h: float, order: int
         return ""
     warning = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
     hint = f"a smaller step for these members; the estimate for the worst is {advised_step(largest, h, order):g}"
-    return f"{warning}, the largest {_multiple(largest)} it: do not trust their numbers\n  hint: {hint}"
+    return f"{warning}; the largest is {_multiple(largest)} the energy: do not trust their numbers\n  hint: {hint}"
 
 
 def _multiple(error: float) -> str:

@@ -71,7 +71,7 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
         hint = "" if continued else "; --force replaces it"
         if file_origin is None and not continued:
             if path.suffix.lower() == ".csv":
-                hint = f" (there is no {companion(path)} to it){hint}"
+                hint = f" (the file {companion(path)} is missing){hint}"
             message = f"{str(path)!r} exists, and does not say which run of phigen wrote it{hint}"
             raise click.BadParameter(message, param_hint=option)
         if file_origin is not None and (difference := origin.difference(file_origin)):

@@ -51,7 +51,8 @@ def lattice_text(spec: Spec) -> str:
     if lattice_spec is None:
         message = f"{spec.name} is not recognised as a lattice"
         least = MIN_SITES_PER_AXIS
-        hint = f"names such as x1, x2, … or x_0_0, … of at least {least} sites along each axis, all with the same terms"
+        names = "a lattice has names such as x1, x2, … or x_0_0, …"
+        hint = f"{names}, and along each axis {least} or more sites with the same terms"
         raise SpecError([spec.diagnostic(("coordinates",), message, hint)])
     return spec_text(lattice_spec)
 

@@ -172,7 +172,8 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
-        # bindings add the function that sets parameters; without them, these options would leave it out
+        # For a binding, the C has the function that sets parameters, which the profile would leave out. So the command
+        # names the bindings.
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     _expect_steps(compilation, target)
@@ -187,7 +188,7 @@ def _expect_steps(compilation: Compilation, target: str) -> None:
     swept = compilation.program.step.swept
     if target == "device" and swept and swept.relative:
         message, hint = (
-            "coordinates_from: the target device has no steps for it",
+            "coordinates_from: the target device cannot make steps in relative coordinates",
             "another target, or remove coordinates_from",
         )
         raise SpecError([compilation.spec.diagnostic(("coordinates_from",), message, hint)])

@@ -161,8 +161,10 @@ def _table(path: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> P
     with opened_text(path) as file:
         header = file.readline().strip().split(",")
         if header != expected:
-            strange = next((name for name in expected if name not in header), "as many columns")
-            raise ValueError(f"it has {len(header)} columns, and not {strange}")
+            strange = next(
+                (f"but not the column {name}" for name in expected if name not in header), f"not {len(expected)}"
+            )
+            raise ValueError(f"it has {len(header)} columns, {strange}")
         rows = np.loadtxt(file, delimiter=",", ndmin=2)
     if not rows.size or rows.shape[1] != len(expected):
         raise ValueError("it has no rows")

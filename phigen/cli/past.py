@@ -134,7 +134,8 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
     """Return a session of the solver, at the state from which the steps of an experiment start.
 
     If the experiment continues a finished run, this is the last state of that run. What was fixed at the first state of
-    that run stays fixed: the gauge, or with a monitor the energy level e = −H.
+    that run stays fixed: the gauge (the multiples of Casimirs that are subtracted from H), or with a monitor the energy
+    level e = −H.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

@@ -117,12 +117,13 @@ def _row(finalist: Finalist, label: str, tuning: Tuning) -> list[str]:
 
 
 def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
-    """Whether the error was measured over the whole horizon, not extrapolated."""
+    """Whether the error was measured up to the end of the requested time, rather than extrapolated."""
     return finalist.point.time > min(0.99 * tuning.horizon, tuning.horizon - finalist.point.step)
 
 
 def gauge_of(curve: Curve) -> str:
-    """Return how the gauge of a method is chosen, in the words of the spec.
+    """Return how the gauge of a method (the multiples of Casimirs that are subtracted from H) is chosen, in the words
+    of the spec.
 
     Returns "none" for methods without a gauge, and "" for classical methods.
     """
@@ -172,7 +173,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
         yield _automatic(tuning)
     for label, peer in ((p.curve.label, p) for p in tuning.peers if p.cost < best.cost):
         share = peer.cost / best.cost
-        yield f"{label} is cheaper: {share:.2g} of the time. It conserves neither Casimirs nor the Poisson structure."
+        yield f"{label} takes {share:.2g} of the time, but conserves neither Casimirs nor the Poisson structure."
     for reason in dict.fromkeys(tuning.refused.values()):
         settings = [s.described() for s, refusal in tuning.refused.items() if refusal == reason]
         yield f"Not measured: {'; '.join(settings)}: {reason}."

@@ -190,7 +190,7 @@ def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector
                 continue
             spec = specs.load(path)
             if spec.name != name:
-                raise CheckError(f"{path} is the spec of {spec.name} now; {name} in {folder} was made from it")
+                raise CheckError(f"{path} now defines {spec.name}, but {name} in {folder} was generated from this file")
             orders.append(VendorRequest(spec, entry.spec_file, entry.options))
     return orders
 
@@ -238,7 +238,7 @@ def _write(
     for system in sources_lack(builds, {name: entry.files for name, entry in all_entries.items()}):
         file, suffix = FILES[system]
         target = "numpy" if suffix == ".py" else "c"
-        raise click.UsageError(f"{file} is for {suffix[1:]} files, and no solver here has one; -t {target} makes it")
+        raise click.UsageError(f"{file} lists {suffix} files, but no solver in the folder has one; add -t {target}")
     build_changes = [Change(folder / file, read(folder / file), text) for file, text in texts.items()]
     obstacles = [o for m, changes in planned for c in changes if (o := _obstacle(c, entries.get(m.order.spec.name)))]
     obstacles += [c.obstacle for c in build_changes if c.obstacle]

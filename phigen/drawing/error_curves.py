@@ -23,7 +23,8 @@ WINDOWS = 400
 HAMILTONIAN = "H(t)"
 #: Height of a row of panels in inches.
 ROW = 2.3
-#: Distance from 1 to the next double. Relative errors of this size are rounding errors; a line marks it.
+#: Distance from 1 to the next double. Relative errors of this size are rounding errors, so panels have a line at this
+#: size.
 ROUNDING = 2.0**-52
 
 LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))

@@ -204,8 +204,8 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 def box_of(points: Floats) -> Floats:
     """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
 
-    A direction in which the points extend little is widened. It is not widened if its values are so small that its axis
-    has a scale of its own.
+    A direction in which the points extend little is widened, unless the values in this direction are so small that its
+    axis has a scale of its own.
     """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low

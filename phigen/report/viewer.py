@@ -32,8 +32,8 @@ def viewer(
     """Return the viewer of the first two trajectories; empty if no curve can be drawn.
 
     If the rows of the whole run are too far apart to be joined by lines, the viewer shows ``opening``, the first steps
-    of the same methods. If the level set of one of the ``casimirs`` is a surface or a curve in the initial axes, it is
-    drawn too.
+    of the same methods. If the level set of one of the ``casimirs`` is a surface or a curve in the axes that are shown
+    at first, the level set is drawn too.
     """
     first = next(iter(methods.values()), None)
     if first is None:

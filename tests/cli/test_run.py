@@ -275,7 +275,7 @@ def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
     assert some[2:4] == [every[2], every[4]]
     part, _ = made("c.csv", "--at", "0.12")
     assert part.exit_code == 2
-    assert "0.12 is between two" in part.stderr
+    assert "0.12 is inside a step" in part.stderr
 
 
 @pytest.mark.slow

@@ -260,7 +260,7 @@ def test_spec_file_that_became_another_system_is_noticed(phigen, vendored):
     Path("models/b.yaml").replace("models/a.yaml")
     result = vendored()
     assert result.exit_code == 5
-    assert "models/a.yaml is the spec of b now; a in project/ext was made from it" in result.stderr
+    assert "models/a.yaml now defines b, but a in project/ext was generated from this file" in result.stderr
 
 
 def test_wrong_usage_is_explained(phigen, write):

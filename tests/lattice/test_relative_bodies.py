@@ -465,7 +465,8 @@ def test_devices_are_refused_at_the_key(tmp_path: Path) -> None:
     command = ["build", str(tmp_path / "bodies.yaml"), "-t", "device", "-o", str(tmp_path / "out")]
     result = CliRunner().invoke(group, command, prog_name="phigen")
     assert result.exit_code == 1
-    assert "bodies.yaml:11:19: error: coordinates_from: the target device has no steps for it" in " ".join(
-        result.stderr.split()
+    assert (
+        "bodies.yaml:11:19: error: coordinates_from: the target device cannot make steps in relative coordinates"
+        in " ".join(result.stderr.split())
     )
     assert not (tmp_path / "out").exists()

@@ -733,7 +733,7 @@ def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster
             large, largest = large + (relative > 0.1), max(largest, relative)
     assert 0 < large < 6
     expected = (
-        f"warning: {large} of 6 members have an energy error above 10% of their energy, the largest {largest:.0%}"
+        f"warning: {large} of 6 members have an energy error above 10% of their energy; the largest is {largest:.0%}"
     )
     assert expected in result.stderr
 
