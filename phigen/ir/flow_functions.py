@@ -38,7 +38,7 @@ class FlowFunctions:
 
     @property
     def arguments(self) -> tuple[ir.Value, ...]:
-        """The arguments of the function of a flow, after its coefficients."""
+        """The arguments that follow the coefficients in calls of the function of a flow."""
         return (X, DISPLACEMENT, START, *[ELEMENT] * self.turns)
 
     def function(self, name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
@@ -129,9 +129,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` stands for the row of
-    the next flow: it is the number of the row if ``size`` is None, else its address, with rows of ``size``
-    coefficients.
+    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` selects the row of the
+    next flow. If ``size`` is None, it is the number of the row. Otherwise it is the address of the row, and a row has
+    ``size`` coefficients.
     """
 
     def further(count: int) -> ir.Value:
@@ -153,10 +153,11 @@ def _in_order(
 
 
 def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
-    """Return the function that adds the increments of a flow to the values ``updated`` of all members of a group.
+    """Return the function that adds the increments of a flow to the values ``updated`` of all members of a
+    group.
 
-    ``form`` is the suffix in its name. It says whether sin and other elementary functions are replaced by versions for
-    small or for all arguments (`phigen.ir.passes.forms`).
+    ``form`` is the suffix of the name of the function. The suffix says whether sin and other elementary functions are
+    replaced by versions for small or for all arguments (`phigen.ir.passes.forms`).
     """
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
@@ -177,8 +178,8 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
     """Return the function that applies all flows of a step to all members of a group.
 
-    ``form`` is the suffix in its name. It says whether sin and other elementary functions are replaced by versions for
-    small or for all arguments (`phigen.ir.passes.forms`).
+    ``form`` is the suffix of the name of the function. The suffix says whether sin and other elementary functions are
+    replaced by versions for small or for all arguments (`phigen.ir.passes.forms`).
     """
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
@@ -201,12 +202,13 @@ _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": 
 
 @dataclass(frozen=True)
 class Transposed:
-    """Description of the transposed kernel of one flow: the indices of the values that it computes and reads.
+    """Description of the transposed kernel of one flow: the indices of the values that the kernel computes and
+    reads.
 
-    It computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; all other contributions are
-    always 0. It recomputes the coordinates ``before`` the flow. It reads ranges of coordinates, with pairs (first
-    index, length) in ``reads``. ``far`` and ``far_back`` say whether the flow and its transpose have a version for all
-    arguments of elementary functions.
+    The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; all other
+    contributions are always 0. It recomputes the coordinates ``before`` the flow. It reads ranges of coordinates, with
+    pairs (first index, length) in ``reads``. ``far`` says whether the flow has a second version, in which elementary
+    functions are correct for all arguments; ``far_back`` says the same about the transpose.
     """
 
     state: Sequence[int]
@@ -270,7 +272,7 @@ class FlowTransposes:
     def group_flows(self) -> ir.Function:
         """Return the function that applies a flow to all members of a group.
 
-        First it stores the coordinates that the transpose of the flow reads.
+        Before this, the function stores the coordinates for the transpose of the flow.
         """
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
@@ -321,8 +323,8 @@ class FlowTransposes:
 def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:
     """Return the call of a function ``name`` for SIMD lanes.
 
-    If the function has a second version, in which sin and other elementary functions are correct for all arguments,
-    groups of members marked ``far`` call this version.
+    The function may have a second version, in which sin and other elementary functions are correct for all arguments.
+    Then the second version is called for a group of members whose flag ``far`` is set.
     """
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:

@@ -21,8 +21,8 @@ def kernel_function(
     """Return the function of a kernel: declarations of the values that it reads, temporaries, then stores.
 
     ``members`` maps parameters of the system to their names in the record of parameters; ``arrays`` renames arguments.
-    Symbols that are not in the spec get no variable; their array entries are read where they are used. With ``named``,
-    parameters of the system get variables, otherwise they are also read where they are used.
+    Parameters of the system get variables if ``named`` is true. Symbols that are not in the spec never get a variable.
+    A value without a variable is read from its array or record wherever it is used.
     """
     arguments = [*kernel.inputs, *(o.name for o in kernel.outputs)]
     names = {argument: ir.fixed((arrays or {}).get(argument, argument)) for argument in arguments}

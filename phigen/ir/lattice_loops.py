@@ -1,8 +1,9 @@
-"""Builder of the loops of a lattice: functions that evaluate kernels of a site in loops over sites, bonds or pairs.
+"""Builder of the loops of a lattice: functions that evaluate kernels of a site in loops over sites, bonds or
+pairs.
 
 `LatticeLoops.meaning` defines, for all targets, which value each symbol of a kernel stands for. The functions are on
-the level of sites. Their stores contain whole expression graphs, which the pass `phigen.ir.passes.temporaries` converts
-to statements.
+the level of sites, which `phigen.ir.nodes` explains. Their stores contain whole expression graphs, which the pass
+`phigen.ir.passes.temporaries` converts to statements.
 """
 
 from __future__ import annotations
@@ -94,8 +95,8 @@ class LatticeLoops:
         """Return the function of a transposed kernel. It is the transpose of a kernel of a ``sweep`` or, without
         ``sweep``, of the implicit equation of a stage.
 
-        ``gather`` has the sums that the kernel reads. By the inverse flow, the kernel recomputes the values of
-        ``fields`` before the sweep.
+        ``gather`` has the sums that the kernel reads. The kernel recomputes, by the inverse flow, the values that
+        ``fields`` had before the sweep.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
@@ -239,7 +240,7 @@ class LatticeLoops:
 
     @cached_property
     def weights(self) -> tuple[Symbol, ...]:
-        """The symbols of the weights at open ends, in the order in which kernels read them."""
+        """The symbols for the weights of terms near open ends, in the order in which kernels read them."""
         equation = self.step.equation
         kernels = (*(sweep.kernel for sweep in self.step.sweeps), *(equation.kernels if equation else ()))
         return _present((*kernels, *self.program.observables.kernels), symbols.PRESENT)
@@ -255,16 +256,16 @@ def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) 
 
 
 def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
-    """Return the weights of one ``kind`` that kernels read, in the order of their first use; weights are 1 at some
-    sites, else 0.
+    """Return the symbols of one ``kind`` of weights that kernels read, in the order of their first use. A weight
+    multiplies a term; it is 1 at some sites, and 0 at all others.
     """
     read = (s for kernel in kernels for s in kernel.inputs["present"])
     return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == kind))
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis. They are read from the ``key`` of the symbol
-    of its weight.
+    """Return the least and the largest offset of a term along each axis. The symbol for the weight of the term contains
+    them in its ``key``.
     """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

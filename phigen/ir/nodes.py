@@ -186,7 +186,8 @@ class Time:
 
 @dataclass(frozen=True)
 class Inside:
-    """Weight of a term at open ends: 1 at sites where all sites that the term reads are on the lattice, else 0.
+    """Weight of a term near open ends: 1 at a site if all values that the term reads there are on the lattice,
+    else 0.
 
     ``bounds`` has the least and the largest offset of the term along each axis.
     """
@@ -204,8 +205,8 @@ class HasColour:
 class OnSeam:
     """Weight of a term of H near boundary seams: 1 if the sweep of a part of H includes the term, else 0.
 
-    The term begins at the site that is ``offset`` away from the site of the loop. It is included if it begins at a site
-    of the colour ``colour`` that lies on exactly those seams that the sweep is for.
+    The term begins at the site that is ``offset`` away from the site of the loop. It is included on two conditions: the
+    site where it begins has the colour ``colour``, and this site lies on exactly those seams that the sweep treats.
     """
 
     number: int
@@ -351,8 +352,8 @@ class Store:
 
 @dataclass(frozen=True)
 class Reduce:
-    """Addition of a value, at each site, to the cotangent of a coefficient, or of a parameter with one value for all
-    sites.
+    """Addition of a value at each site to one cotangent: that of a coefficient, or of a parameter with one value for
+    all sites.
     """
 
     source: str  # "coef" or "params"
@@ -586,7 +587,7 @@ TYPES: dict[str, ParameterType] = {
 
 @dataclass(frozen=True)
 class ConstantTable:
-    """Named array of integers, a table of constants of a model."""
+    """Array of integers with a name: constants of a model."""
 
     name: str
     values: tuple[int, ...]
@@ -612,7 +613,9 @@ class Function:
 
     @property
     def loop(self) -> Loop:
-        """The loop over sites, bonds or pairs of a function before lowering, which is its last statement."""
+        """The loop over sites, bonds or pairs in a function before lowering. It is the last statement of the
+        function.
+        """
         loop = self.body[-1]
         assert isinstance(loop, Loop)
         return loop
@@ -633,7 +636,7 @@ def fixed(name: str) -> Name:
 
 
 def label(text: str) -> Name:
-    """Return a variable that is printed as ``text``, unless a name in the spec is the same."""
+    """Return a variable that is printed as ``text``, or under a similar name if the spec uses this name."""
     return Name(Symbol(LABEL, text))
 
 

@@ -155,8 +155,8 @@ class PathFunctions:
         return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
 
     def _sum(self, t: ConvolutionTerm) -> ir.Value:
-        """Return a convolution as a call of a function of the runtime. A convolution is the sum over orders in a
-        product of two series.
+        """Return the call of the function of the runtime that computes a convolution: the sum over orders in a product
+        of two Taylor series.
         """
         exponent = (_exponent(t),) if t.kind == "power" else ()
         return ir.Called(f"taylor_{t.kind}", (self.layout.series(t.a), self.layout.series(t.b), *exponent, K))
@@ -348,8 +348,8 @@ def _of_order(
     statements: Sequence[ir.Statement],
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
-    """Return a function whose ``statements`` add to the order k + 1 of derivatives of the path, in a loop over
-    lanes.
+    """Return a function whose ``statements``, in a loop over lanes, add terms of order k + 1 to derivatives of the
+    path.
     """
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (

@@ -1,6 +1,6 @@
 """Lowering by rows, for C: functions run over the sites of a row segment.
 
-They receive pointers to the row of the segment and to the neighbouring rows of each array.
+For each array, they receive pointers to the row of the segment and to neighbouring rows.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class RowDeclarations:
             self._once(name, local_name, in_row)
             return
         in_open_rows: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # read before the loop: gcc does not vectorise a loop that reads it
+        if not self.layout.single_row:  # read before the loop, which gcc does not vectorise otherwise
             in_open_rows = ir.fixed(f"there{value.number}")
             self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)

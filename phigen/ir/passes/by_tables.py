@@ -12,7 +12,7 @@ this record:
 - ``colours``: the colour of each site
 - ``sums``: sums over bonds or pairs, one after another
 - ``dw``: the increments of noise
-- values that parameters determine, by their names
+- derived values, which parameters determine: an array over the sites for each, by its name
 - ``massive``: in sums over pairs, the number of the site after the last with a mass
 
 The runtime also defines the methods ``bonds`` and ``begins`` of ``sites``, and the functions ``fill``, ``placed`` and

@@ -20,7 +20,7 @@ from phigen.symbolic.special import SPECIAL
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
 #: Versions of elementary functions for loops over lanes (SIMD) and for loops over sites (IN_LANES). Functions with a
-#: removable singularity are not in IN_LANES, since loops over sites only have their polynomials for small arguments.
+#: removable singularity are not in IN_LANES: for these, loops over sites only call polynomials for small arguments.
 #: FULL_RANGE has the members of IN_LANES that are correct for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
@@ -50,11 +50,12 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms in which functions are needed: a map from the suffix of a form to the versions that it calls.
+    """Return the forms in which functions are needed: a map from the suffix of a form to the versions that it
+    calls.
 
     The form "_near" is for small arguments, and "_far" for all arguments. ``small_argument`` are the elementary
     functions with a polynomial for small arguments. ``limited`` are the elementary functions whose fast versions fail
-    at large arguments. If no function calls one of these, there is a single form, with the suffix "".
+    at large arguments. If no limited function is called, there is a single form, with the suffix "".
     """
     graphs = [v for f in functions for v in values(f.body) if isinstance(v, Expression)]
     if {e.op for e in topological(graphs)}.isdisjoint(limited):

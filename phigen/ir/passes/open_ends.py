@@ -18,10 +18,10 @@ NEAR_ENDS = "_end"
 
 
 def divided_at_ends(function: ir.Function) -> list[ir.Function]:
-    """Return a function without weights, for sites away from open ends, and the function with weights, for sites near
-    them.
+    """Return two functions: one without weights, for sites away from open ends, and one with weights, for sites near
+    open ends. The weight of a term is 0 at sites where the term reaches beyond an end, else 1.
 
-    If there are no weights, return only one function.
+    If the function has no weights, it alone is returned.
     """
     if not any(map(_weight, statements(function.body))):
         return [function]
@@ -37,7 +37,7 @@ def _weight(s: ir.Statement) -> str:
 
 
 def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield the statements with 1 in place of all weights, and without additions of 0 that result."""
+    """Yield the statements with 1 in place of all weights, without those that then add 0."""
     ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
     graphs = (s.value for s in body if isinstance(s, ir.Update))
     values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))

@@ -105,8 +105,8 @@ def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Stat
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return the function by rows of a kernel of the implicit equation of a stage. If ``adds``, it adds its outputs to
-    the arrays of results, otherwise it assigns them.
+    """Return the function that evaluates, by rows, a kernel of the implicit equation of a stage. If ``adds``, it adds
+    its outputs to the arrays of results, otherwise it assigns them.
     """
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 

@@ -10,7 +10,7 @@ SITE, OTHER, SITES, COUNT = (ir.fixed(name) for name in ("i", "j", "sites", "cou
 
 
 def of_array(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in array ``number``, where several arrays follow one another in memory."""
+    """Return the index of a site in the array ``number`` of several arrays that follow one another in memory."""
     if number == 0:
         return site
     return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))

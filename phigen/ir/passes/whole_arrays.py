@@ -33,7 +33,7 @@ _TRANSPOSED = ("bar", "sites", "coef_bar", "parameters_bar")
 def sums_name(kernel: str) -> str:
     """Return the name of the function that computes all sums over bonds or pairs.
 
-    ``kernel`` is the name of its kernel for one end of the bonds.
+    ``kernel`` is the name of the kernel of these sums at one end of the bonds.
     """
     base = kernel.removesuffix("_a").removesuffix("_b")
     plain = base.removeprefix("bond_").removeprefix("pair_")
@@ -43,7 +43,7 @@ def sums_name(kernel: str) -> str:
 def transposed_sums_name(kernel: str) -> str:
     """Return the name of the transpose of the function that computes all sums over bonds or pairs.
 
-    ``kernel`` is the name of its kernel for one end of the bonds.
+    ``kernel`` is the name of the kernel of these sums at one end of the bonds.
     """
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
@@ -152,8 +152,8 @@ class WholeArrays:
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
-        """Yield a call, if ``function`` reads sums over bonds or pairs. It turns cotangents of the sums into cotangents
-        of the state.
+        """Yield the call that turns cotangents of sums over bonds or pairs into cotangents of the state. Yield nothing
+        if ``function`` reads no sums.
         """
         for s in function.body:
             if isinstance(s, ir.GatherSums):
@@ -331,8 +331,8 @@ def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statement that returns at once from a sweep over boundary seams, if the sizes fit the colours without
-    seams.
+    """Yield the first statement of a sweep over boundary seams. It returns at once if the lattice needs no seams, since
+    its sizes are multiples of the periods of the colours.
     """
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))

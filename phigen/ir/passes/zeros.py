@@ -14,7 +14,8 @@ MANY_ZEROS = 6
 
 
 def zeros_first(function: ir.Function) -> ir.Function:
-    """Return the function with a statement that clears each array with many zeros before its first store.
+    """Return the function with added statements. Each array with many zeros is cleared before the first store
+    to it.
 
     The stores of zeros in these arrays are removed.
     """
