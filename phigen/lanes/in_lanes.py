@@ -74,8 +74,8 @@ class Blocks:
 
     ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if the kernels call no library
     function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. ``path`` has
-    the derivatives of paths, whose Taylor series have at most ``slope_terms`` terms. ``room`` is the number of values
-    in each lane that a group of members needs, without the values of predictors.
+    the derivatives of paths; the Taylor series of these derivatives have at most ``slope_terms`` terms. ``room`` is the
+    number of values in each lane that a group of members needs, without the values of predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -135,8 +135,8 @@ class Traces:
     """Paths in lanes, for the reverse pass of an integration that takes one step at a time.
 
     ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack. ``calls`` are the
-    functions that the kernels call, and ``path`` has the derivatives of paths with at most ``slope_terms`` Taylor
-    terms.
+    functions that the kernels call. ``path`` has the derivatives of paths; the Taylor series of these derivatives have
+    at most ``slope_terms`` terms.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -194,10 +194,11 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps if several steps can be solved together.
+    """Return blocks of steps, if several steps can be solved together. Otherwise return the paths for the
+    reverse pass.
 
-    Otherwise return the paths for the reverse pass, if they are in lanes, or None. They are in lanes in double
-    precision only.
+    Returns None if there are no blocks, and paths are not computed in lanes: in single precision, or if the spec
+    excludes lanes.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
@@ -257,7 +258,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
     called_with_forms = _called_in_forms(step)
     called = operations(swept) & called_with_forms
-    # Transposes call the derivatives of these functions at the same small arguments. Their names end with 1.
+    # Transposes call the derivatives of these functions at the same small arguments. The names of the derivatives end
+    # with 1.
     called |= {f for f in SMALL_ARGUMENT_FUNCTIONS if f in called_with_forms and f.removesuffix("1") in called}
     small_argument = tuple(f for f in (*SMALL_ARGUMENT_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*small_argument, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)

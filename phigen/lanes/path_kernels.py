@@ -52,8 +52,8 @@ def back(path: PathAdjoint) -> list[Kernel]:
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels of a Taylor expansion: p = ∇S_h with its derivative, and the coefficients of order 0 of all
-    series.
+    """Return the kernels with which a Taylor expansion begins. They compute p = ∇S_h with its derivative, and the
+    coefficients of order 0 of all series.
     """
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
@@ -94,10 +94,12 @@ def _resolved(
     first: int = 0,
     first_fixed: int = 0,
 ) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
-    """Return coefficients of order 0 of series, and values that are constant along a path, in terms of the ``known``
-    symbols.
+    """Return two tuples of expressions: the coefficients of order 0 of ``series``, and the values ``fixed``, which are
+    constant along a path.
 
-    ``first`` and ``first_fixed`` are the number of the first series and the number of the first constant value.
+    In the coefficients, symbols of constant values and of earlier series are replaced by their expressions, and the
+    symbols in ``known`` by the expressions there. ``first`` is the number of the first series, and ``first_fixed`` that
+    of the first constant value.
     """
     values_by_symbol = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []
