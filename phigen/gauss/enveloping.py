@@ -8,8 +8,8 @@ The products of elements of g with a, b in g and f in S are
     ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a),
 
 where κ is the Killing form, σ the projection on S, τ its transpose, and ι an isomorphism of g and S. The condition that
-these products represent g gives linear equations for c, μ and ν. All other products follow from them. gl(n) and u(n)
-are sl(n) and su(n) with z.
+these products represent g gives linear equations for c, μ and ν. All other products follow from them. The Lie
+algebras gl(n) and u(n) have the star algebras of sl(n) and su(n), where z spans their centre.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from phigen.symbolic.tower import rational
 #: allows.
 MOST_SIMPLE = 21
 
-#: Largest number of nonzero structure constants of a star algebra. Those of the algebras that phigen knows by name have
-#: up to 1,700, in permuted and scaled bases. so(5) in a dense basis has 4,000: then the tangent map of a stage takes
-#: 120,000 operations, more than programs may have.
+#: Largest number of nonzero structure constants of a star algebra. The star algebras of Lie algebras that phigen knows
+#: by name have up to 1,700, in permuted and scaled bases. For so(5) in a dense basis there are 4,000: then the tangent
+#: map of a stage takes 120,000 operations, more than programs may have.
 MOST_TERMS = 2000
 
 
@@ -194,8 +194,8 @@ def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) ->
 class _Module:
     """The module S of symmetric elements in the star algebra A = K ⊕ g ⊕ S ⊕ Z of a simple Lie algebra g.
 
-    ``tensors`` are symmetric tensors over g that span S. ``central`` says whether Z is spanned by a central element z,
-    or 0. ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form.
+    ``tensors`` are symmetric tensors over g that span S. If ``central``, Z is spanned by a central element z, otherwise
+    Z = 0. ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form.
     """
 
     ad: Sequence[fmpq_mat]

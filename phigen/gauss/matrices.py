@@ -2,8 +2,8 @@
 
 Let the matrices ρ represent a Lie algebra. If there is an invertible bilinear form B with ρᵀB + Bρ = 0, then the
 associative algebra that the ρ and 1 generate has the involution a ↦ B⁻¹aᵀB. If there is no such form, the
-representation ρ ⊕ −ρᵀ has one: it pairs the two summands. So the number of unknowns is at most n² or 4n² for so(n),
-so(p, q) and sp(2n), and 2n² for su(n), sl(n) and gl(n).
+representation ρ ⊕ −ρᵀ has one, which pairs the two summands. So the number of unknowns is at most n² for so(n) and
+so(p, q) with p + q = n, 4n² for sp(2n), and 2n² for su(n), sl(n) and gl(n).
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
 
 
 def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
-    """Return a linear projection π of the Lie algebra onto an ideal as a vector with entry k·m + i in row k and column
-    i.
+    """Return a linear projection π of the Lie algebra onto an ideal. Entry k·m + i of the returned vector is the entry
+    of the matrix π in row k and column i.
 
     m is the dimension of the Lie algebra, and π([X, Y]) = X π(Y) − Y π(X) for all X, Y. Returns None if there is no
     such π.

@@ -268,7 +268,7 @@ def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
 
 
 def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
-    """Return constants s_k that absorb the constant terms of affine brackets, when they are added to the coordinates.
+    """Return constants s_k such that affine brackets of the coordinates x_k are linear in x_k + s_k.
 
     With the linear terms c_ij^k, the brackets are {x_i, x_j} = Σ_k c_ij^k (x_k + s_k). ``last`` is the index of the
     basis element that stands for the constant 1. Returns None if there are no such s_k.

@@ -54,7 +54,7 @@ class StageMap:
     scaled: tuple[int, ...]
     places: tuple[tuple[int, ...], ...]
     change: tuple[Expression, ...] = field(default=())
-    pace: Expression = ONE  # multiplies ∇H and covector forces: the rate g of a monitor with forces
+    pace: Expression = ONE  # factor of ∇H and covector forces: the rate g if a system with forces has a monitor
 
     @property
     def logarithms(self) -> dict[int, Expression]:
@@ -259,10 +259,11 @@ def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> l
 
 
 def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
-    """Return the momenta x̃(G f G*) of a group element G for the frame elements f of the star algebra, up to factors.
+    """Return the momenta x̃(G f G*) of a group element G for the frame elements f of the star algebra, up to
+    factors.
 
-    The second result has, for each basis element E_a of the Lie algebra, the coefficients that combine them to x̃(G E_a
-    G*).
+    For each basis element E_a of the Lie algebra, x̃(G E_a G*) is a linear combination of these momenta. The second
+    result has its coefficients.
     """
     algebra, g = group.algebra, _element_at(points, group, places)
     scaled = _scaled(group, group_values(points.system, group))
@@ -405,11 +406,11 @@ def _derivatives(
 
 
 def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return the offset λ − λ_start of the functional that replaces the components of a group element G in a
-    square-zero ideal.
+    """Return the offset λ − λ_start of the functional λ, which replaces the components of a group element G in a
+    square-zero ideal (see `phigen.gauss.square_zero`).
 
     ``w`` = G − 1 has all components, also those in the ideal. ``x`` are the values of the basis elements of the Lie
-    algebra at the start, see `group_values`. See `phigen.gauss.square_zero` for λ.
+    algebra at the start, see `group_values`.
     """
     doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
     left = _functional_times(group.algebra, _scaled(group, x), doubled)
@@ -476,8 +477,8 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 def lifted_functionals(points: StageMap) -> list[Expression]:
     """Return, for each copy of the quaternions in a star algebra, the vector y of the momenta: x̃(q) = y·Im q.
 
-    The components in the order of i, j, k are in one list for all copies. At the start of a step, the frame F satisfies
-    F* k F = y (`phigen.gauss.lift`).
+    The result is a single list. It has three components for each copy, in the order of i, j, k. At the start of a step,
+    the frame F satisfies F* k F = y (`phigen.gauss.lift`).
     """
     values: list[Expression] = []
     for group in points.realisation.groups:

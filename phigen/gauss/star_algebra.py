@@ -141,11 +141,10 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield residuals that decide whether some skew elements form an ideal of all skew elements: those on which
+        """Yield the residuals x̃([u, n]) for all skew elements u and all n in N. Here N are the skew elements on which
         every functional x̃ is 0.
 
-        The residuals are x̃([u, n]) for all skew u and all n among these elements. They are 0 if and only if the
-        elements form an ideal.
+        The residuals are 0 if and only if N is an ideal of the Lie algebra of all skew elements.
         """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):

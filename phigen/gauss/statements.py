@@ -227,8 +227,8 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Decide whether the state is that at the start of a step if all unknowns are 0, and whether the method follows ẋ =
-    π∇H there.
+    """Decide two statements on unknowns that are all 0: they belong to the state at the start of a step, and the
+    derivative of the state there is π∇H.
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]

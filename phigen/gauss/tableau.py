@@ -21,13 +21,12 @@ DIGITS = 60
 #: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: Width of the frequency band of the predictor of a Gauss step. The predictor is optimal for motions with angular
-#: frequencies up to BAND/h times the number of stages. Methods with more stages are used with longer steps, so their
-#: band is wider.
+#: Width of the frequency band for which the predictor of a Gauss step is optimal: motions with angular frequencies up
+#: to BAND/h times the number of stages. Methods with more stages are used with longer steps, so their band is wider.
 BAND = Fraction(1, 4)
 
 
-#: Largest number of previous steps that predictors read in C code with the stages of a step in SIMD lanes.
+#: Largest number of previous steps that a predictor reads, in C code that computes the stages of a step in SIMD lanes.
 EARLIER = 2
 
 #: Widths of the bands of several predictors, in the unit of `BAND`, each with the number of previous steps that the
