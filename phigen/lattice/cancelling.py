@@ -46,10 +46,12 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 
 @dataclass(frozen=True)
 class SumFactors:
-    """Common factors of the forces of bonds or pairs on one field: powers of parameters at sites that may be 0.
+    """The common factor of all forces of bonds or pairs on one field: a product of powers of those parameters at sites
+    that may be 0.
 
-    The sums over bonds and pairs are computed without these factors, and multiplied by ``at_site`` afterwards.
-    ``at_end`` has the exponents of the same factors by their symbols at the end of a bond, such as ``m[a]``.
+    The sums over bonds and pairs are computed without this factor, and multiplied by ``at_site``, which is the factor
+    at the site of the sum. ``at_end`` has the exponents of the powers by the symbols of the parameters at the end of a
+    bond, such as ``m[a]``.
     """
 
     at_site: Expression = ONE
@@ -57,9 +59,9 @@ class SumFactors:
 
 
 def sum_factors(cell: Cell, name: str) -> SumFactors:
-    """Return the factors that all terms of the sums in the force on the field ``name`` have in common.
+    """Return the factor that all summands of the force on the field ``name`` have in common.
 
-    The factors are 1 on a grid, with brackets along bonds, or if no parameter may be 0.
+    It is 1 on a grid, with brackets along bonds, or if no parameter may be 0.
     """
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()

@@ -160,8 +160,8 @@ class Cell:
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """The largest distance along each axis between two sites of one bracket {f, g}: those of f, of g, and of
-        symbols in its value.
+        """The largest distance along each axis between two sites of one bracket {f, g}. The sites of a bracket are that
+        of f, that of g, and those of the symbols in its value.
         """
         second_fields = [symbol(other) for _, other in self.bracket]
         return self._reach([*second_fields, *self.bracket.values()])

@@ -33,7 +33,7 @@ class Misfit:
 class MisfitError(SpecError):
     """Error for runs with sizes that are not multiples of the periods with which the colours of sites repeat.
 
-    ``reason`` states it in one line.
+    ``reason`` names these sizes in one line.
     """
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
@@ -44,8 +44,8 @@ class MisfitError(SpecError):
 def cell_from_spec(spec: Spec) -> Cell:
     """Return the cell of a lattice spec: the fields, brackets and energy densities of one site.
 
-    Raises `SpecError` if the lattice does not allow the form of π, forces or noise of the spec, or if a run has fewer
-    sites along an axis than a term spans.
+    Raises `SpecError` if lattices do not offer the kind of brackets, forces or noise that the spec has, or if a run has
+    fewer sites along an axis than a term spans.
     """
     lattice = spec.lattice
     if lattice is None:
@@ -134,7 +134,8 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line that names all sizes which are allowed by a boundary seam only, and sizes that need no seam.
+    """Return one line that names all sizes that need a boundary seam, and near each of these a size that needs
+    none.
 
     A seam is needed if a size is not a multiple of the period with which the colours of sites repeat.
     """
@@ -167,8 +168,8 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     """Yield an error for forces and noise that a spec with brackets along bonds cannot have.
 
-    With brackets along bonds, πp at a site is a sum over bonds for every covector field p. Forces and noise do not
-    compute this sum.
+    With brackets along bonds, πp at a site is a sum over bonds for every covector field p. phigen does not compute this
+    sum for forces and noise.
     """
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():

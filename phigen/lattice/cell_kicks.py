@@ -1,7 +1,8 @@
-"""Search for a kick part V among two parts of H of a lattice, and its modified potential V + κ{V, {V, T}}.
+"""Search for the potential V of a Nyström method among two parts V and T of H on a lattice.
 
-See `phigen.splitting.kicks`. The bracket of two sums over sites is again a sum over sites s: {F, G} = Σ_s Σ ∂F/∂f(s)
-{f, g}(s) ∂G/∂g(s + d), where the inner sum runs over the brackets of fields f and g at the distance d.
+On grids, the flow of the modified potential V + κ{V, {V, T}} is computed too; see `phigen.splitting.kicks`. The bracket
+of two sums over sites is again a sum over sites s: {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d), where the inner sum
+runs over the brackets of fields f and g at the distance d.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The monitor K = log(A + e) − log(−B) with H = A + B, for lattices in which all pairs of sites interact.
+"""The monitor of lattices in which all pairs of sites interact: steps of equal size in another time than t.
 
-A and B are sums over all sites and pairs, and e = −H(x₀). A is constant along its own flow, and so is B. Therefore the
-flow of each part of K is the flow of A or B over another duration; see `phigen.scheme.logarithmic`. The steps in time
-vary, but are the same for all sites.
+The Hamiltonian for this time is K = log(A + e) − log(−B), where H = A + B. A and B are sums over all sites and pairs,
+and e = −H(x₀). A is constant along its own flow, and so is B. Therefore the flow of each part of K is the flow of A or
+B over another duration; see `phigen.scheme.logarithmic`. The steps in t vary, but are the same for all sites.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
-    """Return the energy of a part of H at the initial state of a run. It is the part whose flow is ``flow``."""
+    """Return the energy, at the initial state of a run, of the part of H whose flow is ``flow``."""
     import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of

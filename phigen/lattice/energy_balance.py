@@ -104,17 +104,16 @@ def integral(values: Floats, h: float, row_positions: Floats | None = None) -> t
     """Return the integrals of the power P from the first time to later times, and an estimate of their error.
 
     ``values`` (steps + 1,) are P at times ``h`` apart. Without ``row_positions`` there is an integral to each of these
-    times. With ``row_positions`` (rows,), there is an integral to each of these positions: times in units of ``h``
-    since the first time, not only whole numbers. An integral beyond the last value extrapolates the last polynomial.
+    times. With ``row_positions`` (rows,), there is an integral to each position. A position is a time since the first
+    time in units of ``h``, not necessarily a whole number. An integral beyond the last value extrapolates the last
+    polynomial.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
 def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
-    """Return the integrals of the power that `integral` returns, by polynomials through ``count`` neighbouring
-    values.
-    """
+    """Return the integrals of the power as `integral` does, by polynomials through ``count`` neighbouring values."""
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))

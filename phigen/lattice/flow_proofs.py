@@ -1,8 +1,9 @@
 """Proofs that the splitting of a lattice is correct, for all sizes at once.
 
-Two kinds of statements are proved. First, the parts sum to H, and the force parts to πζ + f. Second, the flow of each
-part solves its equation of motion at a site. There the components of the gradient of the part and the values at
-neighbours count as constants, since the coordinates of a part commute over the whole lattice.
+Two kinds of statements are proved. First, the parts of H sum to H, and the parts of the forces sum to πζ + f, with the
+covector force ζ and the vector force f. Second, the flow of each part solves its equation of motion at a site. In this
+equation, the gradient of the part and the values at neighbours count as constants. This is correct since the
+coordinates that a part depends on commute over the whole lattice.
 """
 
 from __future__ import annotations

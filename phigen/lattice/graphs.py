@@ -1,9 +1,9 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
 The copies of a term on two bonds may not commute if the bonds share a site. The sites are then coloured at run time,
-when the bonds are known, so that no bond connects two sites of one colour. The part of a colour is the sum of its terms
-over the bonds that begin at sites of this colour or, for some terms, over the bonds that end there. A step applies the
-flows of all colours one after the other.
+when the bonds are known, so that no bond connects two sites of one colour. The part that belongs to a colour is the sum
+of the terms over the bonds that begin at sites of this colour or, for some terms, over the bonds that end at these
+sites. A step applies the flows of all colours one after the other.
 
 Two terms may be mirror images under the exchange of the ends a and b, such as x[a]*y[b] and y[a]*x[b] in a cross
 product. Such terms form one part: one term is summed over the bonds that begin at sites of the colour, and its mirror
@@ -75,8 +75,8 @@ class GraphSearch(PartSearch):
         return []
 
     def _end_of(self, term: Summand) -> int:
-        """Return the class of a term of a bond: whether it is summed over bonds that begin, or end, at the colour of
-        the part.
+        """Return the class of a term of a bond: whether it is summed over the bonds that begin, or that end, at sites
+        of the colour of the part.
 
         If two terms are mirror images under the exchange of the ends, they get different classes.
         """
@@ -133,7 +133,7 @@ class GraphSearch(PartSearch):
 class _SiteEquation:
     """The equation of motion ẋ = ``rates`` of a site under the flow of a part of H.
 
-    ``rates`` has symbols that stand for the expressions in ``forces``. These depend on the sums over bonds in
+    ``rates`` has symbols that stand for the expressions in ``forces``. The forces depend on the sums over bonds in
     ``gathered``.
     """
 

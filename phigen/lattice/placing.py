@@ -20,9 +20,9 @@ ROUNDS = 60
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
     """Return positions (sites, 2) in the unit square, or None for more than `MOST_PLACED` sites.
 
-    The start is the classical scaling of distances along ``bonds`` (bonds, 2), with the two largest eigenvalues. It is
-    improved by iterations of stress majorisation: J. de Leeuw, Applications of convex analysis to multidimensional
-    scaling (1977). The same bonds give the same positions.
+    The first positions are the classical scaling of distances along ``bonds`` (bonds, 2), with the two largest
+    eigenvalues. Iterations of stress majorisation improve them: J. de Leeuw, Applications of convex analysis to
+    multidimensional scaling (1977). The same bonds give the same positions.
     """
     if sites > MOST_PLACED:
         return None

@@ -255,7 +255,8 @@ def _key(e: Expression, names: _SiteNames) -> float:
 
 
 def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
-    """Return the terms of the density whose sum over sites is the sum of ``terms``, which are given with their sites.
+    """Return the terms of the density whose sum over all sites is the sum of ``terms``. Each of the ``terms`` comes
+    with its site.
 
     Each term must occur equally often at every site at which it fits between open ends; else `_NoLatticeError` is
     raised.

@@ -194,8 +194,8 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield residuals that are 0 if the flow of the remainder of H has the right rates: differences to the vector
-        field of the remainder.
+        """Yield residuals that are 0 if the flow of the remainder of H has the right rates. A residual is the
+        difference of a rate and a component of the vector field of the remainder.
 
         The remainder is the part of H without Kepler motions.
         """

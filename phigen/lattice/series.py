@@ -188,8 +188,8 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
     """Return formulas by field, with expressions in place of the symbols of covectors p, for all sites.
 
-    They are p = h(∇H + ζ) + Σ ΔW σ∇g with the covector force ζ and the sources of noise. ``maps`` has formulas in the
-    symbols, such as those for the increment of x in a stage.
+    The expressions are p = h(∇H + ζ) + Σ ΔW σ∇g with the covector force ζ and the sources of noise. ``maps`` has
+    formulas in the symbols, such as those for the increment of x in a stage.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}

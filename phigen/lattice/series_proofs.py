@@ -1,8 +1,8 @@
 """Proofs that the series on a lattice is correct, repeated at each build.
 
 If brackets are between fields of one site only, the axioms of the bi-realisation are proved at one site, otherwise on a
-periodic box. In the box, the sites that α reads at two neighbouring sites do not wrap around. So by translation the
-proof holds for every larger box.
+periodic box. The box is so large that the sites that α reads at two neighbouring sites do not wrap around it. So by
+translation the proof holds for every larger box.
 
 Then two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p =
 h∇H the increment is hπ∇H up to O(h²). A stage is symmetric, so it has order 2.

@@ -8,9 +8,9 @@ have an elementary flow.
 
 Some sizes are not multiples of the period of the colours, as for a ring with two colours and an odd number of sites.
 Then the colours are counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary
-*seam*, form additional parts. A seam is so wide that no other term reaches both its ends. Which terms a site near a
-seam feels depends on its position: in its equation of motion, each term has a weight of the kind `BEGINS`, 1 if the
-term belongs to the part, else 0.
+*seam*, form additional parts. A seam is so wide that no term that begins elsewhere reaches across it. The position of a
+site near a seam decides which terms act on it. So each term has a weight of the kind `BEGINS` in the equation of
+motion: 1 if the term belongs to the part, else 0.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ class Colouring:
         return tuple(w for w in range(axes + 1) if w & axes == w)
 
     def on_seams(self) -> set[int]:
-        """The colours that sites on a seam may have. They are all colours, except if there is a single seam of width 1:
-        it lacks the last colour of a period.
+        """The colours that sites on a seam may have. They are all colours, with one exception: if there is a single
+        seam and its width is 1, the last colour of a period does not occur.
         """
         seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
         if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
@@ -124,8 +124,8 @@ class BondSum:
     """Sums over the bonds or pairs of a site: ``values`` maps a symbol for each sum to its summand in ``x[a]`` and
     ``x[b]``.
 
-    x[a] is x at the site itself, and x[b] is x at its partner. ``end`` is the end of the bond at which the site lies,
-    in the order in which the user lists the ends: a, b, or "" for either. In a part of one colour, ``chosen`` says
+    x[a] is x at the site itself, and x[b] is x at its partner. ``end`` is the end of the bond at which the site lies: a
+    for the end that the user lists first, b for the second, "" for either. In a part of one colour, ``chosen`` says
     which of the two sites has the colour: ``here`` the site itself, ``there`` its partner, "" neither. The symbols in
     ``extremes`` stand for a maximum (``max``) or minimum (``min``) in place of a sum.
     """
@@ -158,9 +158,9 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    A term of H reads sites up to ``reach`` apart. Its flow moves sites up to ``separation`` away from the site where
-    the term begins. The equations of motion read no sites farther away, unless brackets depend on sites other than
-    those of their two arguments.
+    A term of H reads sites up to ``reach`` apart. Its flow updates sites up to ``separation`` away from the site where
+    the term begins. The equations of motion read no sites farther away, unless a bracket {f, g} depends on other sites
+    than those of f and g.
     """
     if period == 1:
         return Seam()

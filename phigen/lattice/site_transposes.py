@@ -18,7 +18,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import BACK, Adjoint, Equation, Partners, Sweep
 
-#: Names of the input arrays of kernels at sites with respect to which kernels are differentiated.
+#: Names of the input arrays with respect to which kernels at sites are differentiated.
 _DIFFERENTIATED_INPUTS = ("site", "start", "gathered", "bonds", "params")
 
 

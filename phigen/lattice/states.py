@@ -115,7 +115,7 @@ class _Reader:
         entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
         if (least := np.min(values)) < 0:
             raise self._out_of_bound(p, values, f"{begin} masses must be nonnegative")
-        if least == 0 and p.name not in symbols_of(*entries):  # no mass in the brackets: momenta
+        if least == 0 and p.name not in symbols_of(*entries):  # brackets without masses are those of momenta
             raise self._out_of_bound(p, values, f"{begin} bodies with momenta must have positive masses")
 
     def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:

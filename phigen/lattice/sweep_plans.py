@@ -476,7 +476,8 @@ def _gather(
 ) -> Gather | None:
     """Return the kernels that compute sums over bonds or pairs, or None if ``sums`` is empty.
 
-    All members of ``sums`` have the same symbols, such as those of both ends of a bond.
+    All members of ``sums`` have the same symbols. For instance, one member is for the ends a of bonds, and one for the
+    ends b.
     """
     if not sums:
         return None
