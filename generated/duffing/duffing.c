@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 42f329606bad6a44c7f041af5da8b207feb86870710f64302ece413b7381ccad
+ * body-sha256: 982193626f41518194301244a6edcb78e7d91b39df70741eb6397cd4eef95730
  */
 #include "duffing.h"
 #include <float.h>
@@ -196,8 +196,8 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 /* ---- Predictors ---- */
 #define duffing_REACH 4.0 /* largest relative distance of a prediction from the last solution */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
-   there the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if
+   the prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int duffing_predict(const duffing_history *history, double value[duffing_DIM])
 {
     double distance = 0.0, size = 0.0;

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c1565272be7006843657a0a494451d79c3cda3989a46d2088b98e2d0ca031027
+ * body-sha256: 4074c609170fd27185d70e88f51ba09d1cf90c176f2bb08e24ee186f43dc03b5
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -669,11 +669,11 @@ class History {
   }
 
   /**
-   * Predict the next solution by the sum of the differences.
+   * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
-   *     has solutions unrelated to the motion
+   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
+   *     that the iteration could find an unrelated one
    */
   predict(value) {
     let distance = 0;

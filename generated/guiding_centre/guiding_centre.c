@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 76d8c256dede77fa9a98250ad7b727622cf69c54999f1614465e388f85ca5acf
+ * body-sha256: a7aaece6cbd95e2d2b6217a6fecf26bb45254276aeffeda9fa53dafb6b8e1be0
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -178,8 +178,8 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 /* ---- Predictors ---- */
 #define guiding_centre_REACH 4.0 /* largest relative distance of a prediction from the last solution */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
-   there the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if
+   the prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
 {
     double distance = 0.0, size = 0.0;

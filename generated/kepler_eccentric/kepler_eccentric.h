@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b286cb8ed650c4715a3657da01c44fde0c4c40d4e1e07b65a74746ee3e7aef11
+ * body-sha256: 02039ff25d39ec1a0574e9c0534b36ad41ef43c52594e57ec0b1d50db92e638c
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -54,7 +54,8 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 
 /* Initialise *s with the state x0; params = NULL for the defaults. Returns kepler_eccentric_BAD_ARGUMENT,
    with *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
-/* It also returns kepler_eccentric_BAD_ARGUMENT if kepler_eccentric_monitor is not positive at x0. */
+/* kepler_eccentric_init also returns kepler_eccentric_BAD_ARGUMENT if kepler_eccentric_monitor is not
+   positive at x0. */
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: d1adc68b9dffc632af6b104af5984f03826ade725a284f37eedb4f653a0a32a7
+ * body-sha256: b5157e1de06297f8eca79a9f5a168476843b40cb7c7e9ab59f2ca980fb34abaf
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -170,8 +170,8 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 /* ---- Predictors ---- */
 #define predator_prey_REACH 4.0 /* largest relative distance of a prediction from the last solution */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
-   there the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if
+   the prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;

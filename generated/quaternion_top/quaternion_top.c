@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 9cf63940a9b476d1caf871b08d0af714b1800d6a365bd7657469f8a65d06a011
+ * body-sha256: 870bc6b611e7299d71dfd9756e8b17e212ddae5b594795e82f336ab8e2d4187f
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -343,8 +343,8 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 /* ---- Predictors ---- */
 #define quaternion_top_REACH 4.0 /* largest relative distance of a prediction from the last solution */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
-   there the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if
+   the prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int quaternion_top_predict(const quaternion_top_history *history, double value[quaternion_top_DIM])
 {
     double distance = 0.0, size = 0.0;

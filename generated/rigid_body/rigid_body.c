@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 572892e89e740b801920fedfc81e1abd73c8df928584a5b28fb8e5fd1bad5148
+ * body-sha256: 28a8df98c0ce8fcbe44ecd94eba27a04ce94957c8cb72fa436144f86f55153c2
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -523,8 +523,8 @@ static int rigid_body_train(rigid_body_history *history, int component)
 /* ---- Predictors ---- */
 #define rigid_body_REACH 4.0 /* largest relative distance of a prediction from the last solution */
 
-/* Whether a prediction is near `last`. Far away the equation of a step has solutions unrelated to the
-   motion. */
+/* Whether a prediction is near the solution `last`. From elsewhere, the iteration could find an unrelated
+   solution. */
 static int rigid_body_near(const double predicted[rigid_body_DIM], const double last[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -542,7 +542,8 @@ enum {
     rigid_body_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
-/* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
+/* Predict the next solution from earlier ones. Returns 0 if none is known, or if the prediction is far from
+   the last one. */
 static int rigid_body_predict(const rigid_body_history *history, double value[rigid_body_DIM])
 {
     const int last = history->count - 1;
@@ -1881,8 +1882,8 @@ static void rigid_body_group_fit(rigid_body_group *group)
         ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
 }
 
-/* In each lane whose prediction y is not near `last`, set y to `last`: far away, the equation of a step has
-   solutions unrelated to the motion. */
+/* In each lane whose prediction y is not near `last`, set y to `last`: from elsewhere, the iteration could
+   find a solution unrelated to the motion. */
 static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     rigid_body_lanes last[restrict rigid_body_DIM])
 {

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f5587c0c46f913b65146e712fd53439a0fd0bca621c9a144d1d69001b8797730
+ * body-sha256: 22043d61930c386796d62fa6c8c86ce0e0022ee93c20802f0814334fe732d669
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -955,11 +955,11 @@ class History {
   }
 
   /**
-   * Predict the next solution by the sum of the differences.
+   * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
-   *     has solutions unrelated to the motion
+   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
+   *     that the iteration could find an unrelated one
    */
   predict(value) {
     let distance = 0;

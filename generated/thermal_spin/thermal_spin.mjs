@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fa7b207990a418be2b7e4b1f3e56531f1884c116aefd1e3460b9e4eab9e365e5
+ * body-sha256: bccd16fed4ee29d1be88921e9c15ad63721cb2e9c2e4a6e2650c68854ec964bc
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -885,11 +885,11 @@ class History {
   }
 
   /**
-   * Predict the next solution by the sum of the differences.
+   * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
-   *     has solutions unrelated to the motion
+   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
+   *     that the iteration could find an unrelated one
    */
   predict(value) {
     let distance = 0;

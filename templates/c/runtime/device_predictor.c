@@ -10,8 +10,8 @@ static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
 /* The loops below have constant bounds, and selections in place of branches, so that a compiler can keep all values in
    registers. */
 
-/* Predict the next solution by the sum of the last one and its differences. Returns 0 if there is no prediction, or if it
-   is far away, where the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if the
+   prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;

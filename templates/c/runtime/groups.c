@@ -137,7 +137,7 @@ static void phi_group_fit(phi_group *group)
     group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
 }
 
-/* In each lane whose prediction y is not near `last`, set y to `last`: far away, the equation of a step has solutions
+/* In each lane whose prediction y is not near `last`, set y to `last`: from elsewhere, the iteration could find a solution
    unrelated to the motion. */
 static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict PHI_DIM])
 {

@@ -5,8 +5,8 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away: there the
-   equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution: the last one plus backward differences. Returns 0 if no solution is known, or if the
+   prediction is so far from the last solution that the iteration could find an unrelated one. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;

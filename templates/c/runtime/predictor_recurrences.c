@@ -6,7 +6,7 @@
 #include "recurrence.c"
 #include "predictor_policy.h"
 
-/* Whether a prediction is near `last`. Far away the equation of a step has solutions unrelated to the motion. */
+/* Whether a prediction is near the solution `last`. From elsewhere, the iteration could find an unrelated solution. */
 static int phi_near(const double predicted[PHI_DIM], const double last[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -23,7 +23,7 @@ enum {
     PHI_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
-/* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
+/* Predict the next solution from earlier ones. Returns 0 if none is known, or if the prediction is far from the last one. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     const int last = history->count - 1;

@@ -29,7 +29,7 @@ size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, the number of doubles */
 /* Initialise *s with the state x0; params = NULL for the defaults. Returns PHI_BAD_ARGUMENT, with *s unchanged, if a
    value or coefficient is not finite, or a parameter that must be positive is not. */
 #if PHI_MONITOR
-/* It also returns PHI_BAD_ARGUMENT if phi_monitor is not positive at x0. */
+/* phi_init also returns PHI_BAD_ARGUMENT if phi_monitor is not positive at x0. */
 #endif
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 

@@ -40,11 +40,11 @@ export class History {
   }
 
   /**
-   * Predict the next solution by the sum of the differences.
+   * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
-   *     has solutions unrelated to the motion
+   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
+   *     that the iteration could find an unrelated one
    */
   predict(value) {
     let distance = 0;
