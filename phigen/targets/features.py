@@ -77,8 +77,8 @@ FEATURES = (
 
 
 def holds(condition: str, switches: Mapping[str, bool]) -> bool:
-    """Whether a condition on switches holds. It consists of alternatives (``||``) of conjunctions (``&&``) of NAME or
-    !NAME.
+    """Whether a condition on switches holds. A condition consists of NAME or !NAME, joined by ``||`` and ``&&``, where
+    ``&&`` binds more strongly.
     """
     return any(
         all(switches[s.removeprefix("!")] != s.startswith("!") for s in part.split(" && "))

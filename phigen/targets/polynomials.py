@@ -10,7 +10,8 @@ _BLOCK = 4
 
 
 def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
-    """Return statements, and the value of Σ c_k variable^k.
+    """Return Σ c_k variable^k as text in C: statements, and the expression of the value, which uses their
+    variables.
 
     Estrin's scheme combines blocks of four coefficients. The values of the blocks are variables that are named by
     letters, from ``first`` on.

@@ -179,9 +179,10 @@ def _described(place: int) -> str:
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of elliptic functions: the comment, the template of Carlson's integral, the arguments of Carlson's
-#: integral up to t, and its arguments for half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and
-#: S, and ratio is R/P.
+#: The integrals of elliptic functions, by Carlson's integrals. Each entry has the comment, the template of Carlson's
+#: integral, the arguments of Carlson's integral for the integral up to t, and its arguments for the integral over half
+#: a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P;
+#: `phigen.symbolic.elliptic` defines S, P and R.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
     elliptic.RATIOS: (
@@ -228,7 +229,7 @@ def elliptic_texts(
 
 
 def _nested_series() -> str:
-    """Return the power series of S/t in x and y as text, arranged by Horner's rule."""
+    """Return the power series of S/t (see `phigen.symbolic.elliptic`) in x and y as text, by Horner's rule."""
     return _nested([_nested([repr(float(c)) for c in row], "x") for row in elliptic.series()], "y")
 
 

@@ -35,9 +35,9 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: PASSES iterations over a block of steps take, for each step, as much time as one evaluation at a single point.
-#: PASSES_OF_CALLS is the same number for loops that call library functions, and for paths: a single evaluation of a
-#: path needs no derivatives of the path.
+#: Costs of blocks of steps: PASSES iterations over a block take, for each step of the block, as much time as one
+#: evaluation at a single point. PASSES_OF_CALLS is the same number for loops that call library functions, and for
+#: paths: a single evaluation of a path needs no derivatives of the path.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
@@ -233,8 +233,8 @@ def _stack(bound: StackBound, name: str) -> Sizes:
     ]
 
 
-#: Kernels that are public functions: the kernel, the name of its function, and whether the function returns the only
-#: output.
+#: Kernels that become public functions. An entry has the kernel, the name of the function, and whether the function
+#: returns its only output, instead of storing it.
 Exported = list[tuple[Kernel, str, bool]]
 
 

@@ -56,8 +56,9 @@ class Small:
     """An elementary function with a series for small arguments t: Σ_k s_k z^k/(first + k·step)!.
 
     The factors s_k are the two ``signs`` in turn, and z is t², or t if ``step`` is 1. ``far`` is the formula for all
-    arguments. ``flows`` describes the version for flows: the largest |t|, the number of terms, and the function as a
-    text in the sum P. ``rows`` describes the version for loops over sites, which has the fewest operations.
+    arguments. ``flows`` describes the version for flows: the largest |t|, the number of terms, and the function as
+    text, in which P stands for the sum. ``rows`` describes the version for loops over sites, which has the fewest
+    operations.
     """
 
     meaning: str

@@ -15,9 +15,9 @@ from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
 #: Threshold for the end of sweeps in single precision. Like all thresholds, it is given for double precision, and
-#: `phigen.targets.c.real.threshold` converts it: 1.3e-20 becomes 1e-9. As a fraction of a rounding error, 1e-9 is in
-#: single precision what 2e-18 is in double precision. With 2e-18 converted by this rule, the energy error of 1e5 steps
-#: of Hénon–Heiles would be 2e-5 instead of 5e-7.
+#: `phigen.targets.c.real.threshold` converts it: 1.3e-20 becomes 1e-9. Relative to a rounding error, 1e-9 in single
+#: precision is as small as 2e-18, the threshold for double precision. The conversion of 2e-18 itself gives a larger
+#: number. With this number, the energy error of 1e5 steps of Hénon–Heiles would be 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
 #: Threshold for the end of sweeps of methods whose stages are in a loop, not in lanes. With 2e-18, the relative energy

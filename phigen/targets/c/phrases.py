@@ -15,10 +15,11 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Choice:
-    """Macros whose texts depend on the same switches. ``phrases`` maps each macro to one text for each condition.
+    """Macros whose texts depend on the same switches. ``phrases`` maps each macro to one text for each
+    condition.
 
-    The text belongs to the first of the ``conditions`` that holds; the last text is for the case that none holds.
-    ``about`` says in a comment what the macros are for.
+    The text for the first of the ``conditions`` that holds is used; if none holds, the last text is used. ``about``
+    says in a comment what the macros are for.
     """
 
     about: str

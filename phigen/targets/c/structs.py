@@ -94,7 +94,7 @@ COTANGENT = (
             "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* derivatives of L by the coefficients */",
         ),
     ),
-    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state with respect to which x has derivatives */",)),
+    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state to which the derivatives x belong */",)),
     StateBlock(
         "after",
         "GAUSS",

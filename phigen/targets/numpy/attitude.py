@@ -61,8 +61,8 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Return the two factors of several products of group elements, in the order of the multiplication, by a name for
-    each product.
+    """Return several products of group elements by name: for each product, its two factors in the order of the
+    multiplication.
 
     If momenta are in space coordinates (``spatial``), later factors are on the left.
     """

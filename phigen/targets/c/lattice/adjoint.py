@@ -87,9 +87,9 @@ class _Pulled:
     cotangents with the numbers ``bars`` or, if ``bars`` is empty, in the variation of the row. ``gather`` has the sums
     that the kernel reads. ``ends`` has three items for each of these sums: its kernel, the parameters that change sign
     at the end b of a bond, and its transpose. ``before`` are statements that a row segment executes before the calls.
-    The fields ``recomputed`` are recomputed by this kernel, or by the kernel ``undo`` from sums that the transposes
-    over bonds or pairs compute. ``taken`` are the contributions of the previous flow of the reverse pass, which this
-    kernel adds.
+    The kernel recomputes the fields ``recomputed``. If ``undo`` is set, the kernel ``undo`` does this instead; it reads
+    sums that the transposes over bonds or pairs compute. ``taken`` are the contributions of the previous flow of the
+    reverse pass, which this kernel adds.
     """
 
     kernel: Kernel
@@ -371,7 +371,9 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """Return the fields and parameters that the transposed kernels read. They read the values from before the sweep."""
+    """Return the fields and parameters that the transposed kernels read. The kernels read the values from before the
+    sweep.
+    """
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
 

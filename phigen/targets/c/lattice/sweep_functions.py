@@ -88,7 +88,7 @@ class _Call:
 
     If ``order`` or ``bonds`` is not empty, the loop reads the fields, or the parameters at bonds, in this order. Before
     the call, the record of the segment receives the ``colour`` of the sweep, and its ``window``: the set of boundary
-    seams for which the sweep is. ``shared`` is the name of the loop if several parts of H call it. ``others`` are calls
+    seams that the sweep treats. ``shared`` is the name of the loop if several parts of H call it. ``others`` are calls
     that may replace this one.
     """
 
