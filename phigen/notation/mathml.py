@@ -24,7 +24,7 @@ from phigen.symbolic.symbols import GAUGE, PART, Symbol
 #: Number of characters of markup above which a part of a formula is replaced by an ellipsis.
 LONGEST = 60_000
 
-#: Largest number of terms of a polynomial whose terms are reordered so that it does not begin with a minus sign.
+#: A polynomial with at most this number of terms is reordered if it would begin with a minus sign.
 FEW = 4
 
 #: Number of characters of an exponent above which a power of e is written as exp(…).
@@ -63,7 +63,7 @@ class Factor:
 
     @property
     def markup(self) -> str:
-        """Markup of the factor as part of a product, in which a sum has parentheses."""
+        """Markup of the factor inside a product; a factor that is a sum has parentheses."""
         base = f"<msub>{self.base}{self.index}</msub>" if self.index else self.base
         return _row(base + self.tail) if self.tail else base
 

@@ -142,7 +142,7 @@ class _AbandonedError(Exception):
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:
-    """Return the tokens of an expression, of which the last has the kind ``end``; None after a reported error."""
+    """Return the tokens of an expression; the last one has the kind ``end``. None after a reported error."""
     if len(source) > limits.EXPRESSION_LENGTH:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
         report(message, 0, "name parts of it under definitions", limit=True)

@@ -402,7 +402,7 @@ class Reduction:
 
 @dataclass(frozen=True)
 class Lattice:
-    """Relation between the sites of a lattice, each of which has the coordinates of the spec.
+    """Relation between the sites of a lattice. Each site has the coordinates of the spec.
 
     ``axes`` name the directions of a grid, with a ``boundary`` for each: ``periodic`` or ``open``. ``graph`` is the
     name of the list of bonds. ``pairs`` says that every two sites form a pair. ``poisson`` and ``hamiltonian`` of the

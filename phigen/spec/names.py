@@ -26,7 +26,7 @@ NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 
 
 def argument_hint(name: str) -> str:
-    """Return the hint for a parameter whose ``name`` is that of an argument of generated functions."""
+    """Return the hint for a parameter that has the ``name`` of an argument of generated functions."""
     proposed = f"{name}_0" if len(name) > 1 else f"{name}{name}"
     return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {proposed}, say"
 
@@ -151,7 +151,7 @@ LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
 #: Words for ``structure:`` of a Gauss method: its step is a Poisson map exactly, or up to the truncation error.
 STRUCTURES = ("exact", "to truncation")
-#: Relative coordinates of attracting bodies, in which H is split.
+#: Relative coordinates for attracting bodies; a splitting divides H into parts in these coordinates.
 RELATIVE = ("jacobi", "democratic_heliocentric")
 #: Classical methods with which a run can be compared.
 CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")

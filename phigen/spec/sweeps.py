@@ -90,8 +90,8 @@ def _kept(
 def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
     """Return the reason why a sweep cannot repeat this run; "" if it can.
 
-    All members must make the same number of whole steps. So a run is refused if it ends at a condition, or if what the
-    sweep varies changes the number of its steps.
+    All members must make the same number of whole steps. So a run is refused if it ends at a condition, or if the
+    number of its steps depends on quantities that the sweep varies.
     """
     statement = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:

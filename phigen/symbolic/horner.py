@@ -35,7 +35,7 @@ def _powers(monomial: Monomial) -> Powers:
 
 
 def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return the result of `sparse_horner` for terms with nonzero coefficients, of which there is at least one."""
+    """Return the result of `sparse_horner` for at least one term; all coefficients are nonzero."""
     if len(terms) == 1:
         ((monomial, coefficient),) = terms.items()
         return coefficient * _monomial(monomial, variables)
