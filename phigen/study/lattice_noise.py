@@ -106,8 +106,8 @@ def _along_lines(
 ) -> Floats:
     """Return the state at the end of a piecewise linear path from ``x``, by one RK4 step of size h for each piece.
 
-    ``path`` has the increments (steps·parts, sources, *sizes), of which ``parts`` are added up for each step. The drift
-    is the vector field of ``solver``; ``sources`` have the fields σ π∇g.
+    ``path`` has the increments (steps·parts, sources, *sizes). The increment of a step is the sum of ``parts`` of
+    these. The drift is the vector field of ``solver``; ``sources`` have the fields σ π∇g.
     """
     drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
     begin = t0 or 0.0

@@ -67,7 +67,7 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
 
 
 def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
-    """Return the method of a generated solver for a system with noise, in which all increments of the noise are 0."""
+    """Return the method of a generated solver with all increments of the noise set to 0."""
     begin, draws = t0 if solver.interface.time else None, solver.interface.draws
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:

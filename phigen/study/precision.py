@@ -56,7 +56,9 @@ class PrecisionCurve:
     slope: float
 
     def seconds_for(self, tolerance: float) -> float:
-        """Return the shortest time, in seconds, of a point with an error up to ``tolerance``; NaN if there is none."""
+        """Return the shortest time, in seconds, of the points whose error is at most ``tolerance``; NaN if there are
+        none.
+        """
         return min((p.seconds for p in self.points if p.error <= tolerance), default=math.nan)
 
 
@@ -131,9 +133,9 @@ def error_of(state: Floats, target: Floats) -> float:
 def slope(errors: Mapping[int, float], floor: float) -> float:
     """Return the observed order, from the ``errors`` by number of steps.
 
-    The order is log₂ of the quotient of the errors with n and 2n steps, where both errors are in the asymptotic range:
-    they are neither rounding errors nor very large. The result is the median for the three largest n; NaN if there is
-    no such n.
+    The order is log₂ of the quotient of the errors with n and 2n steps. Both errors must be in the asymptotic range:
+    they are neither rounding errors nor very large. The result is the median for the three largest n; NaN if no n has
+    two errors in this range.
     """
     # If the error grows from one number of steps to the next, it is rounding error.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])

@@ -29,7 +29,7 @@ class Plan:
 
     ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
     ranges of the varied quantities; values along axes without a size are drawn at random with ``seed``. ``noise`` is
-    the seed of the noise, of which each member has another path. ``members`` is 0 for a grid; otherwise it is the
+    the seed of the noise; each member has its own path of the noise. ``members`` is 0 for a grid; otherwise it is the
     number of random members or of the rows of a file, and the only dimension is ``member``. ``listed`` names the
     columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice, workers compute the
     initial state from the spec, and ``initial`` is not used.

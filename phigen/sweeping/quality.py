@@ -1,4 +1,4 @@
-"""Detection of members of a sweep whose energy error is so large that their results mean nothing."""
+"""Detection of members of a sweep that have meaningless results, by their large energy errors."""
 
 from __future__ import annotations
 

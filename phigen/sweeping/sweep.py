@@ -35,7 +35,7 @@ from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_
 #: Intended processor time of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: For Lyapunov exponents: assumed time, in seconds, of a step with its tangent map, which Python processes.
+#: For Lyapunov exponents: assumed time, in seconds, of a step with its tangent map. Python processes the tangent maps.
 _TANGENT = 40e-6
 
 #: Smallest and largest number of members of a chunk.
@@ -160,7 +160,7 @@ def _with_ensembles(spec: Spec) -> Spec:
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """Raise `LimitError` if the values along a dimension, of which two arrays are needed, do not fit into memory."""
+    """Raise `LimitError` if two arrays with the values along a dimension, which are needed, do not fit into memory."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
