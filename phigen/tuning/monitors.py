@@ -152,7 +152,7 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
     """Return the quotient of the smallest value of ``b`` along the motion and its median.
 
-    It is small for a distance that becomes small in close encounters; such distances come first in the list of bases.
+    The quotient is small for a distance that becomes small in close encounters. Bases with small quotients come first.
     """
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))

@@ -21,7 +21,7 @@ AIM = 0.8
 #: The search for a cheaper step goes on to smaller steps, which may need fewer iterations. It ends when the cost
 #: exceeds the least cost by this factor.
 DEARER = 1.25
-#: A bi-realisation is not tried at other orders if its cost exceeds the least cost by more than this factor.
+#: A method is not tried at other orders if its cost exceeds the least cost by more than this factor.
 KEEP = 3.0
 #: A scan has reached rounding error if halving the step divides the error by less than GAIN, and if the error is below
 #: SMALL or below MANY_ROUNDINGS times the rounding error of one step.
@@ -257,8 +257,8 @@ def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: 
 def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
     """Return the settings to try next, the most promising first; [] if none is promising.
 
-    A bi-realisation whose cost is near the least cost is tried at the next higher order, as long as the cost decreases,
-    then at the next lower order. The best bi-realisation is also tried without gauge and as a composition.
+    A method whose cost is near the least cost is tried at the next higher order. If that does not reduce its cost, the
+    next lower order is tried. The best method is also tried without gauge and as a composition.
     """
     costs = {setting: curve.cost(accuracy) for setting, curve in tried_curves.items()}
     families: dict[Setting, dict[int, float]] = {}

@@ -181,7 +181,7 @@ class Tuner:
     def orbit_error(self, curve: Curve, h: float) -> float | None:
         """Return the error of the orbit over the time span of the search, for a method with steps of size ``h``.
 
-        The reference solution is computed by DOP853; None if this fails.
+        The reference solution is computed by DOP853. The result is None if the run fails, or if there is no reference.
         """
         stride, count = marks(self.piece, h)
         states = self.methods[curve.key].rows(h, stride * count, stride)
@@ -222,8 +222,8 @@ class Tuner:
     def _refer(self, setting: Setting, method: Candidate) -> None:
         """Compute a reference solution, and measure errors of orbits from now on.
 
-        The reference is computed by a solver of higher order than the setting of the spec, if one can be built, and is
-        confirmed by DOP853.
+        The reference is computed by a solver of order 8 or more if one can be built, else by the solver of the spec. It
+        is confirmed by DOP853.
         """
         problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
