@@ -170,7 +170,10 @@ class _Compiled(ABC):
         return None
 
     def named(self, method: str) -> str:
-        """Return a line that names the method and, if the runs of the spec decide the method, the reason."""
+        """Return a line that names the method.
+
+        If the runs of the spec decide the method, the line also has the reason.
+        """
         return method
 
     def by_series(self) -> CompiledSeries:
@@ -525,7 +528,10 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return a line that names the method and, if the sizes in the runs decide the method, the reason."""
+        """Return a line that names the method.
+
+        If the sizes in the runs decide the method, the line also has the reason.
+        """
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count

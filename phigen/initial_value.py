@@ -1,5 +1,6 @@
-"""The function `solve_ivp`, with the arguments and the result of `scipy.integrate.solve_ivp`, over a solver of
-phigen."""
+"""The function `solve_ivp`, which integrates by a solver of phigen. Its arguments and its result are those of
+`scipy.integrate.solve_ivp`.
+"""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
 def length(experiment: Experiment, solver: AnySolver) -> float:
     """Return the length of a run up to its end, in the time t.
 
-    With a monitor g, the length is that in the new time τ, for which dt = g dτ. Raises `StepError`.
+    With a monitor g, the length is that in the rescaled time τ, for which dt = g dτ. Raises `StepError`.
     """
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps

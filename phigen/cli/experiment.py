@@ -45,7 +45,7 @@ class Experiment:
 
     @property
     def h(self) -> float:
-        """The step size, in the time t, or with a monitor in the new time τ."""
+        """The step size in the time t or, with a monitor g, in the rescaled time τ, for which dt = g dτ."""
         return float(self.run.step)
 
     @property

@@ -81,7 +81,9 @@ def past_of(path: Path, names: Interface, option: str) -> StoredRows:
 
 
 def _expect_rows(stored_rows: StoredRows, needed_columns: Sequence[str]) -> None:
-    """Raise `ValueError` for rows that no run has written, and `KeyError` if one of ``needed_columns`` is absent."""
+    """Raise `ValueError` for rows that cannot be those of a run, and `KeyError` if one of ``needed_columns`` is
+    absent.
+    """
     if (
         stored_rows.rows.dtype != np.float64
         or stored_rows.rows.ndim != 2

@@ -162,9 +162,10 @@ def initial_value_problem(
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
-    """Return the initial value problem of an experiment over the length ``horizon``, by default that of its run.
+    """Return the initial value problem of an experiment over the length ``horizon``, by default that of its
+    run.
 
-    The length is in the time t, or with a monitor in the new time τ.
+    The length is in the time t or, with a monitor g, in the rescaled time τ, for which dt = g dτ.
     """
     import numpy as np
 

@@ -74,7 +74,7 @@ def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | 
 
 @styled
 def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
-    """Return a figure of Poincaré sections. The mapping has an array of points (rows, DIM) for each label.
+    """Return a figure of Poincaré sections; ``sections`` maps labels to arrays of points (rows, DIM).
 
     The figure shows the plane of two of the coordinates ``names``.
     """

@@ -210,10 +210,10 @@ class CSolver:
     def _all_turned(
         self, members: Members, initial: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
     ) -> None:
-        """Integrate members with attitudes in place.
+        """Integrate members that have attitudes. Their states and attitudes are updated in place.
 
-        ``initial`` are their states (DIM, members) and attitudes (numbers, members). ``rows`` are two arrays that
-        receive the states and the attitudes of the frames.
+        ``initial`` are the states (DIM, members) and attitudes (numbers, members). ``rows`` are two arrays that receive
+        the states and the attitudes of the frames.
         """
         packed, times_or_gauges, h = self._packed_arguments(members)
         start = [packed if members.parameters else None, *initial]
@@ -306,8 +306,10 @@ class CSolver:
     def _all_pulled(
         self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of the members of one part of an ensemble; each call of C processes all members over one
-        segment."""
+        """Return states and cotangents for one part of an ensemble, as `pullback` does for the whole.
+
+        Each call of C processes all members of the part over one segment of the run.
+        """
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
         parameters_address = packed.ctypes.data if members.parameters else None
@@ -352,7 +354,10 @@ class CSolver:
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of one member of an ensemble; its segments are processed in reverse order."""
+        """Return states and cotangents for one member of an ensemble, as `pullback` does for all members.
+
+        The segments of the run are processed in reverse order.
+        """
         current, segment_sessions, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
         for segment in segments:
             segment_sessions.append(current)

@@ -192,7 +192,9 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings in the latest block of steps; its first ``searched`` intervals were searched before."""
+        """Yield the crossings (t, x) in the latest block of steps; the first ``searched`` intervals of the block were
+        searched before.
+        """
         self.places = []
         for sign in SIGNS[self.direction]:
             self._sign = sign
@@ -236,9 +238,11 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Return the fraction of interval j at which sign·g is smallest, by golden-section search.
+        """Return the fraction at which sign·g is smallest in interval j, between two points where g was
+        evaluated.
 
-        If the search meets a fraction at which g and v[j] have different signs, it returns this fraction at once.
+        The search is a golden-section search. If it meets a fraction at which g and v[j] have different signs, it
+        returns this fraction at once.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
@@ -258,8 +262,11 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _value_at(self, j: int, fraction: float) -> float:
-        """Return the value of g at a fraction of interval j: on the collocation polynomial or, without one, by a
-        step."""
+        """Return the value of g at a fraction of interval j, which lies between the points j and j + 1 where g was
+        evaluated.
+
+        The state is computed from the collocation polynomial or, if the method has none, by a step.
+        """
         step, part = divmod(j, self.points)
         if self.points > 1:
             return self._on_polynomial(step, [(part + fraction) / self.points])[0]
@@ -323,7 +330,8 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the zero of g in a step, as a fraction of the step and a session at the zero; None if it is not found.
+        """Return the zero of the function g in a step, as a fraction of the step and a session at the zero; None if it
+        is not found.
 
         Newton's method starts from the zero on the collocation polynomial. The iteration may not converge at a double
         zero of g.

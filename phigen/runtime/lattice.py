@@ -315,8 +315,8 @@ class LatticeTrajectory:
     def casimir_changes(self) -> dict[str, Floats]:
         """Return the absolute change (frames,) of each Casimir since the start, by name.
 
-        For a Casimir of each site, this is the largest change at any site. Frames are read one by one, so memory holds
-        one frame.
+        For a Casimir of each site, this is the largest change at any site. Frames are read one by one, so that only one
+        frame is in memory.
         """
         if not self.solver.interface.casimirs:
             return {}

@@ -1,4 +1,6 @@
-"""Derivatives in reverse mode of runs of lattices: one run, or an ensemble whose members may differ in parameters."""
+"""Derivatives of runs of lattices, in reverse mode: of one run, or of an ensemble whose members may differ in
+parameters.
+"""
 
 from __future__ import annotations
 

@@ -96,8 +96,9 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """The settings with which a run requests a spectrum and a correlation; None for a result that it does not
-    request."""
+    """Settings of the ``spectrum`` and of the ``correlation`` that a run requests; None for one that is not
+    requested.
+    """
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
@@ -129,11 +130,11 @@ def _number(value: Fraction | None) -> float | None:
 
 
 def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
-    """Return S(q, ω) of some coordinates, over the frames from the time ``after`` on, with a Hann window in time.
+    """Return the dynamic structure factor S(q, ω) of some coordinates, by a Fourier transform of frames.
 
-    Frames must be equally spaced in time; if only the last frame is at a shorter distance, it is left out. Open axes
-    are treated as periodic. Raises `ValueError` for lattices that are not grids, unknown coordinates, and fewer than
-    four frames.
+    The frames from the time ``after`` on are used, weighted by a Hann window in time. They must be equally spaced in
+    time; if only the last frame is at a shorter distance, it is left out. Open axes are treated as periodic. Raises
+    `ValueError` for lattices that are not grids, unknown coordinates, and fewer than four frames.
     """
     fields = [_index(run, name) for name in ([of] if isinstance(of, str) else of)]
     _expect_grid(run, "a spectrum")

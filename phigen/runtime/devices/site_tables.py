@@ -1,4 +1,6 @@
-"""Arrays of a lattice on a device other than its state: neighbours, bonds, parameters at sites, selections of sites."""
+"""Arrays that a lattice has on a device besides its state: neighbours, bonds, parameters at sites, selections
+of sites.
+"""
 
 from __future__ import annotations
 
