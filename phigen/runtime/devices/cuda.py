@@ -76,7 +76,9 @@ class CUDADevice:
             self._checked_call(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bound in its source
+        group = self._checked_call(
+            lambda: kernel.max_threads_per_block
+        )  # not above the launch bound in the source of the kernel
         launch_arguments = tuple(
             np.uint64(0) if argument is None else argument for argument in arguments
         )  # 0 is a null pointer
