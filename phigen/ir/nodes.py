@@ -425,10 +425,9 @@ class Selection:
     """The sites over which a loop runs.
 
     With a ``colour``, they are the sites of this colour. ``inside`` excludes the sites near boundary seams. With a
-    ``window``, the loop runs over sites near seams: those that are reached by terms on the seams of some axes. The bits
-    of ``window`` say which axes these are. Sites with numbers below ``first`` are excluded. ``massive`` excludes the
-    sites after the last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site
-    of a pair.
+    ``window``, the loop runs over the sites near seams that terms on certain seams reach; the bits of ``window`` are
+    the axes of these seams. Sites with numbers below ``first`` are excluded. ``massive`` excludes the sites after the
+    last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site of a pair.
     """
 
     colour: int | None = None

@@ -55,7 +55,7 @@ class RowSegment:
 
     @property
     def near_ends(self) -> bool:
-        """Whether the calls treat sites near open ends and seams in another way than all other sites."""
+        """Whether the calls differ between sites near open ends or seams and all other sites."""
         return divides(self.calls)
 
 
@@ -169,8 +169,9 @@ class _Driver:
     def over_segments(self, cases: Sequence[RowSegment | ir.Block], labels: Sequence[int]) -> ir.Block:
         """Return the loop over row segments, or a switch over several loops of this kind.
 
-        If one loop serves all parts of H and the lattice is a single row with open ends, the ends of all fields are
-        copied to the halo after each case, since only the first and the last segment read these copies.
+        Each case copies the ends of the rows of the fields that it updates to the halo. There is an exception: if one
+        loop serves all parts of H, and the lattice is a single row with open ends, a statement after the switch copies
+        the ends of all fields. Only the first and the last segment read these copies.
         """
         drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
         copies = [[*self._copied_ends(case)] for case in segments]
