@@ -1,14 +1,14 @@
 """Square-zero ideals of star algebras. They reduce the number of unknowns of a step.
 
 Let A = B ⊕ N with a subalgebra B and an ideal N such that N² = 0, B* = B and N* = N. Write group elements as G = g + n,
-with g in B and n in N. For b in B and c in N, the momenta are x̃(G(b + c)G*) = λ(bg*) + κ(cg*), since x̃(gbn*) =
-x̃(nbg*). Here λ(b) = x̃(gb) + 2x̃(nb) is a functional on B, and κ(c) = x̃(gc) is a functional on N. So n enters only
-through λ.
+with g in B and n in N. Let x̃ be the functional of `phigen.gauss.star_algebra`. For b in B and c in N, the momenta are
+x̃(G(b + c)G*) = λ(bg*) + κ(cg*), since x̃(gbn*) = x̃(nbg*). Here λ(b) = x̃(gb) + 2x̃(nb) is a functional on B, and κ(c)
+= x̃(gc) is a functional on N. So n enters only through λ.
 
 If Ġ = G(e + v) with e in B and v in N, then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So the derivatives of g and λ depend on
 g and λ alone, and λ is a linear function of G. Gauss methods commute with linear maps, so a method with the unknowns g
-and λ makes the same step as with the unknown G. The number of these unknowns is 2 dim B. In the motion of a body, N are
-the translations, or the directions of several fields, and (g, λ) is a point of T*B.
+and λ makes the same step as with the unknown G. The number of these unknowns is 2 dim B. For the motion of a body, N
+consists of the translations, or of the directions of several fields, and (g, λ) is a point of T*B.
 """
 
 from __future__ import annotations
