@@ -183,7 +183,7 @@ def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     for name, source in spec.noise.items():
         if any(offset != cell.origin for _, offset in cell.places(source.hamiltonian).values()):
             message = f"noise: {name} acts at single sites, so its Hamiltonian must not name neighbours"
-            hint = "each site has increments of its own, for a function of its own coordinates"
+            hint = "write a function of the coordinates of one site; each site receives increments of its own"
             yield spec.diagnostic(("noise", name, "hamiltonian"), message, hint)
 
 

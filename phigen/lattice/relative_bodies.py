@@ -149,7 +149,7 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
         axes, momenta = _axes(cell, positions, mass)
     except _OtherFormError as error:
         message = f"{KEY}: {spec.coordinates_from} needs {_FORM}: {error}"
-        hint = "the first body is the heaviest; with jacobi the others follow from the inside out"
+        hint = "list the heaviest body first; with jacobi, list the others by increasing distance from it"
         raise SpecError([spec.diagnostic((KEY,), message, hint)]) from None
     derived = replace(cell, derived=(INNER_MASS,))
     return LatticeBodies(derived, spec.coordinates_from, axes, mass, gravity, momenta)
