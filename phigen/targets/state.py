@@ -167,7 +167,7 @@ STATE = (
         "rate",
         "RATE_OF_GAUGE",
         (
-            "double rate[PHI_RATE]; /* rate of an additional rotation: gradient of what is subtracted from H */",
+            "double rate[PHI_RATE]; /* rate of an additional rotation: gradient of the function subtracted from H */",
             "double aside[PHI_ELEMENT]; /* the additional rotation in one step, minus the identity */",
         ),
         reset=("phi_set_aside(s);",),

@@ -159,7 +159,7 @@ SOLVER = (
     StateFields(
         "RATE_OF_GAUGE",
         (
-            "/** Rate of the gauge rotation: gradient of what is subtracted from H; the time when it was set. */",
+            "/** Rate of the gauge rotation (gradient of the function subtracted from H), and time when it was set. */",
             "turningRate;",
             "attitudeFrom;",
         ),
