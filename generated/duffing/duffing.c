@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 982193626f41518194301244a6edcb78e7d91b39df70741eb6397cd4eef95730
+ * body-sha256: 272b24e39245a8b2f20e0168ebf23dea65e708bf0e6455321f368ea5fdf747a9
  */
 #include "duffing.h"
 #include <float.h>
@@ -31,7 +31,7 @@ static int duffing_allowed(const duffing_params *params)
     return isfinite(params->A) && isfinite(params->omega) && params->omega > 0.0;
 }
 
-/* Everything that depends on the time, but not on the state. */
+/* Compute the coefficients that depend on the time. */
 static void duffing_at_time(const double coef[22], double t, double now[11])
 {
     const double t1 = coef[14] * t, t2 = cos(t1), t3 = coef[16] * t2, t4 = sin(t1), t5 = coef[19] * t4;
@@ -49,7 +49,7 @@ static void duffing_at_time(const double coef[22], double t, double now[11])
     now[10] = (-0.5) * t3;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void duffing_prepare(const duffing_params *params, double h, double coef[22])
 {
     const double t1 = h * h, t2 = h * t1, t3 = t2 * (0.125 - 3.0 / 80.0 * t1);
@@ -232,8 +232,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define duffing_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

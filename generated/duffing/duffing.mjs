@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4074c609170fd27185d70e88f51ba09d1cf90c176f2bb08e24ee186f43dc03b5
+ * body-sha256: 32cb257fc349b55b8c090f2d517ec2306e08c2a811de2019cf4e483fc7247085
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -61,7 +61,7 @@ const MAX_ITERATIONS = 20;
 /** Iterations end if the next correction of y is expected to be smaller than this, relative to y. */
 const TOLERANCE = 1e-20;
 
-/** Everything that depends on parameters and step size only. */
+/** Compute the coefficients that depend only on parameters and step size. */
 function prepare(params, h, coef) {
   const t1 = h * h;
   const t2 = h * t1;
@@ -98,7 +98,7 @@ function prepare(params, h, coef) {
   coef[21] = t9 * t2 * (1 / 12 + t1 * (-1 / 120 - t10));
 }
 
-/** Everything that depends on the time, but not on the state. */
+/** Compute the coefficients that depend on the time. */
 function refresh(coef, t, now) {
   const t1 = coef[14] * t;
   const t2 = Math.cos(t1);
@@ -184,9 +184,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
 const SHRINKING = 0.25;
 
-/** Longest accepted step, relative to |x| + |h dx/dt|. */
+/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in accepted longer steps. */
+/** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

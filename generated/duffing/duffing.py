@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 9f3fcad841ea31ffd7da5a4fe5e9402cc127e77f27116efadbe0de7f4c78f5f9
+# body-sha256: 76419abe64f3815d40b054eb622b8eb8580cd744286c17651b7ee1ea614b33f9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -116,7 +116,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     A = parameters["A"]
     omega = parameters["omega"]
     t1 = h * h
@@ -156,7 +156,7 @@ def _prepare(parameters, h):
 
 
 def _refresh(coef, t):
-    """Everything that depends on the time, but not on the state."""
+    """Compute the coefficients that depend on the time."""
     t1 = coef[14] * t
     t2 = np.cos(t1)
     t3 = coef[16] * t2
@@ -212,8 +212,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # longest accepted step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in accepted longer steps
+PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
 def _plausible(stage, x, end):

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: a7aaece6cbd95e2d2b6217a6fecf26bb45254276aeffeda9fa53dafb6b8e1be0
+ * body-sha256: c7aff39b7fcc626d71cd21e009e4ecd5248edd64b3e2d18504747f6d2080024a
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -36,7 +36,7 @@ static int guiding_centre_allowed(const guiding_centre_params *params)
         && params->k > 0.0;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void guiding_centre_prepare(const guiding_centre_params *params, double h, double coef[5])
 {
     const double t1 = params->kappa * params->kappa;
@@ -214,8 +214,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-#define guiding_centre_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define guiding_centre_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -454,7 +454,7 @@ enum {
 #define guiding_centre_NEGLIGIBLE 1e-17
 /* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define guiding_centre_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, relative to the path and its slope */
+/* largest rounding error of the slope at the end of a path, relative to end and slope */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the square root of rounding */
 #define guiding_centre_DIFFERENCE 1e-7

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 26a1cd26d128b70456c17f42b9485928738e6ae5b532134332a5da137b1e0ac6
+ * body-sha256: 14c74fb15cbbace91b4c5d500c3e1c34f56e8a8c185bf4a70d3bad2b13b157d5
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -133,7 +133,7 @@ static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry
     }
 }
 
-/* Everything that depends on parameters and the time of a flow only. */
+/* Compute the coefficients that depend only on parameters and the duration of a flow. */
 static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, const double gauge[1],
     double h, double coef[4])
 {

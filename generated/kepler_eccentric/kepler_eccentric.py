@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 51dfc9c7ddc26e8b11a89aefef1fe1d63ee4a0b0823222b3118078dcb5f11954
+# body-sha256: d44c99fb2f7e1a64ca7a2d237ba8483ccf0db6365d80cf96c40d427f81c37a58
 import numpy as np
 
 VERSION = "0.1.0"
@@ -117,7 +117,7 @@ def _admissible(values):
 
 
 def _prepare_row(parameters, gauge, h):
-    """Everything that depends on parameters and the time of a flow only."""
+    """Compute the coefficients that depend only on parameters and the duration of a flow."""
     oblateness = parameters["oblateness"]
     return [gauge[0], h, 0.5 * oblateness, 7.5 * (h * oblateness)]
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: c7052c1a652b59c865d2b8bd421904ab85b553773b6c5afd286bfdf4fea70005
+ * body-sha256: fd9ff13f9d6f417c27ba164cd4903453009bb86d6c007ea586b1825cbfebb4af
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -29,7 +29,7 @@ enum { kowalevski_gauss_PLAIN = 4 }; /* the first unknowns, whose changes are re
 enum { kowalevski_gauss_POINT = 6 };
 enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* largest number of sweeps over the stages of a step */
 
-/* Everything that depends on parameters only. */
+/* Compute the coefficients that depend only on parameters. */
 static void kowalevski_gauss_prepare(const kowalevski_gauss_params *params, double h, double coef[restrict 1])
 {
     (void)params, (void)h, (void)coef;
@@ -524,7 +524,7 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
 }
 
 enum {
-    /* a step fails if (number of stages + this) changes in a row have grown */
+    /* a step fails if the change grows in (number of stages + this) sweeps in a row */
     kowalevski_gauss_MOST_RISING = 3,
     /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,
@@ -533,9 +533,9 @@ enum {
 #define kowalevski_gauss_SOLVED 2e-18
 /* above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted */
 #define kowalevski_gauss_STALLED 0.8
-/* below this, sweeps end when a change exceeds STALLED times the last one */
+/* below this, sweeps end when a change exceeds STALLED times the one before */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* below this, sweeps end when a change is not smaller than the last one for the second time */
+/* below this, sweeps end at the second change that is not smaller than the one before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */

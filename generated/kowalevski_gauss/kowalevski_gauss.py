@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 09674136c6e77ab5889d5fb26d1694e28eddccada42d3656f94ded223f72c83a
+# body-sha256: fb22cd99d47cdb9053d216f3e6fb73a12eff8469cd65b4f1490436b31b06690d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -114,7 +114,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters only."""
+    """Compute the coefficients that depend only on parameters."""
     return []
 
 
@@ -200,11 +200,11 @@ def _next_frame(coef, x, z, k):
         ])
 
 
-MOST_RISING = 3  # a step fails if (number of stages + this) changes in a row have grown
+MOST_RISING = 3  # a step fails if the change grows in (number of stages + this) sweeps in a row
 SOLVED = 2e-18  # largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
-ROUNDING = 4e-16  # below this, sweeps end when a change exceeds STALLED times the last one
-NEARLY_ROUNDING = 2e-14  # below this, sweeps end when a change is not smaller than the last one for the second time
+ROUNDING = 4e-16  # below this, sweeps end when a change exceeds STALLED times the one before
+NEARLY_ROUNDING = 2e-14  # below this, sweeps end at the second change that is not smaller than the one before
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation with nodes c, weights b and matrix A: NODES is c, WEIGHTS is b, MIXING is mu = A diag(1/b). All

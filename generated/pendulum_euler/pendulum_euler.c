@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 40a805b503b8777ef43b9a171cf2fca785e38d9199302c2c1282c9832717a5c4
+ * body-sha256: 03373d53922336dd94e4f2dbd981a48983f756c7d1c73f36cccdb20b7b084377
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -20,7 +20,7 @@ static int pendulum_euler_allowed(const pendulum_euler_params *params)
     return isfinite(params->g) && params->g > 0.0;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[2])
 {
     coef[0] = params->g * h;

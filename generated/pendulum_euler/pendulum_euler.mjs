@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 99e0abb0eb41503bfc9bc36b6ef24714cf2d86968e0b043b77467b27afa40d62
+ * body-sha256: cffa24ac5d90aa71c7a91f9249053bb166100a795e4fd946fdfbf175925fbf1e
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -43,7 +43,7 @@ const FRACTIONS = [1.0];
 /** Number of coefficients: functions of parameters and step size. */
 const COEFFICIENTS = 2;
 
-/** Everything that depends on parameters and step size only. */
+/** Compute the coefficients that depend only on parameters and step size. */
 function prepare(params, h, coef) {
   coef[0] = params.g * h;
   coef[1] = h;

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 636a6f90d6e3ab07d63b12056021392828913431c3c904a91ac49c10a47de454
+# body-sha256: 5b954dde9aec52cf11914fec642937a2097313adfff7ace1e2f1dd5c3b5b0c9b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -114,7 +114,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     g = parameters["g"]
     return [g * h, h]
 

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 9329d32d0aa8568693525b196994ea8c5a6a4d45717942ee107a995b82de32d0
+ * body-sha256: 9a9d7b52d1b5e76fbb35b2d27db8b0a5f28bcb436e0c763008335f8fde53a166
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -548,7 +548,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 /* ---- Krylov spaces ---- */
 #define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends */
 #define point_vortices_USEFUL 0.9  /* largest relative residual of an accepted correction */
-/* solutions farther from x than this, relative to x and its first change, are rejected */
+/* largest accepted distance of a solution from x, relative to |x| + |first change of x| */
 #define point_vortices_PLAUSIBLE 1.5
 
 /* Scalar product of x and y, each field divided by its usual size. Sums of row segments are added in order,

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8a605c960278e48e517c17b48a609d03f67ac2a2a99e7739144907e4680ea435
+# body-sha256: da3b2dd81fa5426dffb8369a4243e626ea5dbb4cc749395ac1bf29977e5753f4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -198,7 +198,7 @@ def _advance(sites, rows, x, past):
 DIRECTIONS = 24  # dimension of the Krylov space in which a correction is computed
 SOLVED = 1e-6  # relative residual at which the iteration for a correction ends
 USEFUL = 0.9  # largest relative residual of an accepted correction
-PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its first change, are rejected
+PLAUSIBLE = 1.5  # largest accepted distance of a solution from x, relative to |x| + |first change of x|
 
 
 def _middle(coef, x, prediction, sites, past):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: b5157e1de06297f8eca79a9f5a168476843b40cb7c7e9ab59f2ca980fb34abaf
+ * body-sha256: 0bd69702ba072e41eccc0483108d17ad241f4fdc01e65bc6a3f1591501f808d4
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -29,7 +29,7 @@ static int predator_prey_allowed(const predator_prey_params *params)
         && params->death > 0.0;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void predator_prey_prepare(const predator_prey_params *params, double h, double coef[11])
 {
     const double t1 = params->death * h, t2 = h * h, t3 = h * t2;
@@ -206,8 +206,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define predator_prey_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8f3d5d21736fec8dde5d9fa6594ff73395306248b16fdf432d09a13d8d8e18da
+# body-sha256: 607aea100ee05b8b1e637add7b80a4cce42a97611d715671c6a91f6aa0ded292
 import numpy as np
 
 VERSION = "0.1.0"
@@ -118,7 +118,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     growth = parameters["growth"]
     attack = parameters["attack"]
     gain = parameters["gain"]
@@ -206,8 +206,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # longest accepted step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in accepted longer steps
+PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
 def _plausible(stage, x, end):

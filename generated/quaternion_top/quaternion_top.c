@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 870bc6b611e7299d71dfd9756e8b17e212ddae5b594795e82f336ab8e2d4187f
+ * body-sha256: 693e92df2ec4cdbc6ffa0abcb1ab798d3140eb7373acf34d3b3d2e966e47d16c
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -32,7 +32,7 @@ static int quaternion_top_allowed(const quaternion_top_params *params)
         && isfinite(params->I3) && params->I3 > 0.0 && isfinite(params->weight) && isfinite(params->spring);
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void quaternion_top_prepare(const quaternion_top_params *params, const double gauge[1], double h,
     double coef[47])
 {
@@ -379,8 +379,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-#define quaternion_top_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define quaternion_top_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -686,7 +686,7 @@ enum {
 #define quaternion_top_NEGLIGIBLE 1e-17
 /* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define quaternion_top_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, relative to the path and its slope */
+/* largest rounding error of the slope at the end of a path, relative to end and slope */
 #define quaternion_top_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the square root of rounding */
 #define quaternion_top_DIFFERENCE 1e-7

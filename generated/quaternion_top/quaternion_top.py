@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0d830f5e12bc08ad2862532441b2be63f63910f6c37232a47d17abb421b6523f
+# body-sha256: f9a6f745e1bfff0be9fd0891697cd4c156c4d814fef2aff287138eb25074fd22
 import numpy as np
 
 VERSION = "0.1.0"
@@ -120,7 +120,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, gauge, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -449,7 +449,7 @@ MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps tha
 PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
 LEAST_SHARE = 1e-5  # terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|
-ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
+ROUNDED_SLOPE = 2e-15  # largest rounding error of the slope at the end of a path, relative to end and slope
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the square root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
@@ -825,8 +825,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # longest accepted step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in accepted longer steps
+PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
 def _plausible(stage, x, end):

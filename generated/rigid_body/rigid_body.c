@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 28a8df98c0ce8fcbe44ecd94eba27a04ce94957c8cb72fa436144f86f55153c2
+ * body-sha256: ec456a68d0d41a23b2ecba3cac1098e5110ceb5b5d9eb4a8540fb747e2b62de5
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -91,7 +91,7 @@ static double rigid_body_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void rigid_body_prepare(const rigid_body_params *params, const double gauge[1], double h,
     double coef[restrict 35])
 {
@@ -636,8 +636,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define rigid_body_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -722,14 +722,14 @@ enum {
     /* degree of the squared error in the factor of a Casimir, since S_3 is cubic in H */
     rigid_body_DEGREE = 6,
     rigid_body_SWEEPS = 4, /* largest number of rounds; a round optimises each factor once */
-    /* number of grids in the search for a factor; each is finer by the factor MESH than the last one */
+    /* number of grids in the search for a factor; each is finer by the factor MESH than the one before */
     rigid_body_GRIDS = 3,
     rigid_body_FIRST_REACH = 24,  /* points of the first grid on each side of its centre */
     rigid_body_REACH_OF_GRID = 8, /* points of later grids on each side of the best point so far */
 };
 /* distance of the points of the first grid, in units of the width |grad H|/|grad C| */
 #define rigid_body_MESH 0.125
-/* distance between successive sample states, relative to the size of the first */
+/* distance between successive sample states, relative to the size of the first state */
 #define rigid_body_SAMPLE_LENGTH 0.25
 /* errors count as equal if they differ by less than this fraction of the sum of all: rounding must not
    decide */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 22043d61930c386796d62fa6c8c86ce0e0022ee93c20802f0814334fe732d669
+ * body-sha256: 6fbfa5f98ab5f2f4e0edae4240fdce15f97474af8d60c266bd12dde405c1d91b
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -116,7 +116,7 @@ function phi1(s) {
   return value1;
 }
 
-/** Everything that depends on parameters and step size only. */
+/** Compute the coefficients that depend only on parameters and step size. */
 function prepare(params, gauge, h, coef) {
   const t1 = 1 / params.I1;
   const t2 = h * h;
@@ -463,9 +463,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
 const SHRINKING = 0.25;
 
-/** Longest accepted step, relative to |x| + |h dx/dt|. */
+/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in accepted longer steps. */
+/** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
@@ -479,7 +479,7 @@ const SAMPLES = 32;
 const DEGREE = 6;
 /** Largest number of rounds; a round optimises each factor once. */
 const SWEEPS = 4;
-/** Number of grids in the search for a factor; each is finer by the factor MESH than the last one. */
+/** Number of grids in the search for a factor; each is finer by the factor MESH than the one before. */
 const GRIDS = 3;
 /** Points of the first grid on each side of its centre. */
 const FIRST_REACH = 24;
@@ -487,7 +487,7 @@ const FIRST_REACH = 24;
 const REACH_OF_GRID = 8;
 /** Distance of the points of the first grid, in units of the width |grad H|/|grad C|. */
 const MESH = 0.125;
-/** Distance between successive sample states, relative to the size of the first. */
+/** Distance between successive sample states, relative to the size of the first state. */
 const SAMPLE_LENGTH = 0.25;
 /** Errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide. */
 const CLOSE_CALL = 1e-12;

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b6b1ffd8854ed04b53edb375c18ef2358a0de9cba99ed9b8863b64bbe559f44b
+# body-sha256: 68ac981910f1d90af24d69120219ede430566d6a6d72bf2889e33bc6143c5b59
 import numpy as np
 
 VERSION = "0.1.0"
@@ -207,7 +207,7 @@ def _phi1(s):
 
 
 def _prepare(parameters, gauge, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -458,8 +458,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # longest accepted step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in accepted longer steps
+PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
 def _plausible(stage, x, end):
@@ -553,11 +553,11 @@ def _advance(stage, x, carry, memory):
 SAMPLES = 32  # number of sample states along a short piece of the trajectory
 DEGREE = 6  # degree of the squared error in the factor of a Casimir, since S_3 is cubic in H
 SWEEPS = 4  # largest number of rounds; a round optimises each factor once
-GRIDS = 3  # number of grids in the search for a factor; each is finer by the factor MESH than the last one
+GRIDS = 3  # number of grids in the search for a factor; each is finer by the factor MESH than the one before
 FIRST_REACH = 24  # points of the first grid on each side of its centre
 REACH_OF_GRID = 8  # points of later grids on each side of the best point so far
 MESH = 0.125  # distance of the points of the first grid, in units of the width |grad H|/|grad C|
-SAMPLE_LENGTH = 0.25  # distance between successive sample states, relative to the size of the first
+SAMPLE_LENGTH = 0.25  # distance between successive sample states, relative to the size of the first state
 CLOSE_CALL = 1e-12  # errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide
 
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: ebcda4da80cd65b7aec9672151cfd6cc02b58f22753dad5407fb0a9a26e70943
+ * body-sha256: 7f791d73511f1781caca127c769d9a08b7610c43fe9954acfcc08cb5c6dfff17
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -90,7 +90,7 @@ static double thermal_spin_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* Everything that depends on the increments of the noise, but not on the state. */
+/* Compute the coefficients that depend on the increments of the noise. */
 static void thermal_spin_at_step(const double coef[7], const double dw[3], double now[6])
 {
     const double t1 = coef[5] * dw[2], t2 = t1 - coef[6];
@@ -102,7 +102,7 @@ static void thermal_spin_at_step(const double coef[7], const double dw[3], doubl
     now[5] = coef[6] - t1;
 }
 
-/* Everything that depends on parameters and step size only. */
+/* Compute the coefficients that depend only on parameters and step size. */
 static void thermal_spin_prepare(const thermal_spin_params *params, double h, double coef[7])
 {
     const double t1 = params->B * h;
@@ -259,8 +259,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5         /* longest accepted step, relative to |x| + |h dx/dt| */
-#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in accepted longer steps */
+#define thermal_spin_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bccd16fed4ee29d1be88921e9c15ad63721cb2e9c2e4a6e2650c68854ec964bc
+ * body-sha256: 2b139b4c665a205a0d3992930e768e44d404d852b32c6972b6509dd8cf798bb6
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -136,7 +136,7 @@ function phi1(s) {
   return value1;
 }
 
-/** Everything that depends on parameters and step size only. */
+/** Compute the coefficients that depend only on parameters and step size. */
 function prepare(params, h, coef) {
   const t1 = params.B * h;
   coef[0] = -t1;
@@ -148,7 +148,7 @@ function prepare(params, h, coef) {
   coef[6] = t1;
 }
 
-/** Everything that depends on the increments of the noise, but not on the state. */
+/** Compute the coefficients that depend on the increments of the noise. */
 function refresh(coef, dw, now) {
   const t1 = coef[5] * dw[2];
   const t2 = t1 - coef[6];
@@ -282,9 +282,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
 const SHRINKING = 0.25;
 
-/** Longest accepted step, relative to |x| + |h dx/dt|. */
+/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in accepted longer steps. */
+/** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

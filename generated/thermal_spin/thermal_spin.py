@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f3430bf752ddb86f005968da4572670233655c4a86fcd2826a0540e9a961e719
+# body-sha256: 01eb7ec4697dabec8f9b3f878b273cb8121fe082b662de641ee2f9ae9d6541c7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -212,7 +212,7 @@ def _phi1(s):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and step size only."""
+    """Compute the coefficients that depend only on parameters and step size."""
     B = parameters["B"]
     T = parameters["T"]
     damping_rate = parameters["damping_rate"]
@@ -221,7 +221,7 @@ def _prepare(parameters, h):
 
 
 def _refresh(coef, dw):
-    """Everything that depends on the increments of the noise, but not on the state."""
+    """Compute the coefficients that depend on the increments of the noise."""
     t1 = coef[5] * dw[2]
     t2 = t1 - coef[6]
     return [coef[5] * dw[0], coef[5] * dw[1], t2 * t2, t2, 0.5 * t2, coef[6] - t1]
@@ -300,8 +300,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # longest accepted step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in accepted longer steps
+PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
 def _plausible(stage, x, end):

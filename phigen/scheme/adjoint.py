@@ -163,7 +163,7 @@ def completed(
         "refresh_adjoint",
         {"now_bar": refresh.outputs[0].values},
         {TABLE: coefficients.slots},
-        "cotangents of the coefficients that do not depend on the time, from those of the others",
+        "cotangents of the constant coefficients, from those of the coefficients that change during a run",
     )
     constant = _constant_coefficients(coefficients, differentiated)
     return Adjoint(tuple(_without(kernel, constant) for kernel in steps), prepare_adjoint, refresh_adjoint, path)

@@ -181,13 +181,14 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel that computes all values that depend on parameters and step size only, the coefficients.
+    """Return the kernel ``prepare``, which computes the coefficients: all values that depend on parameters and step
+    size only.
 
     It must be built last, when the table of coefficients is full.
     """
     return Kernel(
         "prepare",
-        "everything that depends on parameters and step size only",
+        "compute the coefficients that depend only on parameters and step size",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )

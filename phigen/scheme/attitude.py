@@ -1,5 +1,9 @@
-"""Kernels of the attitude of a body: the group element by which a step rotates the body, computed from the covector p =
-∇S_h(y) or from the flows of a splitting, and the rotation by the Casimirs that the gauge subtracts from H."""
+"""Kernels of the attitude of a body.
+
+They compute the group element by which a step rotates the body: from the covector p = ∇S_h(y) of the step, or from the
+flows of a splitting. If the gauge subtracts Casimirs from H, a further kernel computes the rotation that these Casimirs
+contribute.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +30,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Text for generated code. It describes the last entry of an output whose other entries are the components p_i of a
-#: matrix P = Σ p_i E_i: this last entry is a bound for the square of the size of P.
+#: Text for generated code, about an output with the components p_i of a matrix P = Σ p_i E_i and one more entry. This
+#: last entry is a bound for the square of the size of P.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.

@@ -26,14 +26,15 @@ EXPLICIT_STEP = 25.0
 #: the dimension over WAITING_COORDINATES; this divisor is at least 1 and at most MOST_PARALLEL. Without the division,
 #: the estimates for tops and so(4) were 2.4 times too large.
 WAITING_COORDINATES, MOST_PARALLEL = 2.6, 2.4
-#: Nanoseconds of an operation in a Newton iteration with several SIMD lanes; the number of operations whose code fits
-#: into the caches; additional nanoseconds of each operation beyond this number.
+#: Three numbers. First: nanoseconds of an operation in a Newton iteration with several SIMD lanes. Second: the number
+#: of operations whose code fits into the caches. Third: additional nanoseconds of each operation beyond this number.
 NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 #: Nanoseconds of a step by Newton's method for each entry of its matrix.
 NEWTON_ENTRY = 8.0
-#: Nanoseconds, summed over all sweeps of a Gauss step with eight stages in SIMD lanes: of an arithmetic operation in
-#: the vector field, and of an elementary function in it. Then the nanoseconds of the remaining work of a step, and of a
-#: change to the frame of the next step. With up to four stages the operations take half of the time.
+#: Nanoseconds of a Gauss step with eight stages in SIMD lanes, summed over all sweeps. The first two numbers are those
+#: of an arithmetic operation in the vector field, and of an elementary function in it. The third is that of the
+#: remaining work of a step, and the fourth that of a change to the frame of the next step. With up to four stages the
+#: operations take half of the time.
 STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
 #: Time of a division, in units of an addition.
 DIVISION = 4

@@ -32,7 +32,10 @@ def _sum(a: Expression, ratio: Fraction, b: Expression) -> Expression:
 
 
 def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with static factors collected, each of which is replaced by one coefficient of the table."""
+    """Return the expressions ``roots`` with the static factors of each product collected into one factor.
+
+    Each collected factor is replaced by a coefficient of the table ``coefficients``.
+    """
 
     def product(v: _Value) -> Expression:
         if v.static is ONE and v.number in (1, -1):

@@ -24,8 +24,8 @@ from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbol
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Largest accepted ratio of two numbers of terms of S_1 … S_3: with a multiple λ of a Casimir in H, and without it.
-#: Above this ratio the additional terms cost more than the smaller error gains.
+#: A multiple λ of a Casimir C is free only if S_1, S_2 and S_3 for H − λC have at most this many times as many terms as
+#: for H. Beyond this ratio the additional terms cost more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
 #: Index i of the term S_i of the generating function whose error h^i π∇S_i the gauge makes small.

@@ -141,7 +141,7 @@ def build_gauss(
         attitude = gauss_attitude(system, group, points, coefficients, gauge)
     prepare = Kernel(
         "prepare",
-        "everything that depends on parameters only",
+        "compute the coefficients that depend only on parameters",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )

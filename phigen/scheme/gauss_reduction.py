@@ -1,10 +1,12 @@
 """Gauss sweeps over a part of the unknowns, when the other unknowns follow from it by linear equations.
 
 An example is q̇ = M⁻¹p with ṗ = −∇V(q): the sweeps iterate p alone. In general a *follower* f has ḟ = r₀ + Σ_k c_k z_k
-with constant c_k, and all other unknowns z depend on followers only. Let τ_i be the nodes of the method, A its matrix,
-ν = Aμ, and L_j the increment of stage j. Then the offset of f at stage i, and f' at the end of the step, are
+with constant c_k, and all other unknowns z depend on followers only. The Gauss method has the nodes τ_i, the weights
+b_j and the matrix A with the entries a_ij. For an unknown z_k with the rate ż_k, L_k,j = h b_j ż_k is the increment of
+stage j. So the offset of z_k at stage i is Σ_j μ_ij L_k,j with μ_ij = a_ij/b_j. Let ν be the product of the matrices A
+and μ. Then the offset of f at stage i, and the value f' at the end of a step that starts at f = 0, are
 
-    Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j),    f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j).
+    Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j),    f' = h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j).
 
 One sweep over the z contracts as much as two sweeps over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and all brackets
 between two followers or between two z are 0, the step is symplectic, as Suris showed. Unknowns on which no other
@@ -23,8 +25,8 @@ from phigen.scheme.steps import ReducedSweeps
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kind of the symbols for the sums Σ_j ν_ij L_j at a stage: integrals of the stage increments, which reduced sweeps
-#: read.
+#: Kind of the symbols for the sums Σ_j ν_ij L_k,j at stage i. They are integrals of the unknowns z_k up to this stage;
+#: the kernels of reduced sweeps read them.
 READ = "u"
 
 #: Symbols of the time of a stage since the start of the step, as a fraction of the step, and of the step size.

@@ -85,8 +85,8 @@ class NearIntegrable(Alternation):
 class Corrected(NearIntegrable):
     """A method with a symplectic corrector for H = A + εB: each step is one flow of εB and one flow of A.
 
-    ``corrector`` has the durations of the flows at the end of a run; the inverse flows come at its start. ``multiple``
-    h² {B, {B, A}} is added to B in the steps, but not in the corrector.
+    ``corrector`` has the durations of the flows at the end of a run; the inverse flows come at its start. In the steps,
+    but not in the corrector, the product of ``multiple`` and h²{B, {B, A}} is added to B.
     """
 
     corrector: tuple[Fraction, ...] = ()

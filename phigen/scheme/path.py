@@ -1,9 +1,9 @@
-"""The path ṁ = π(m)p as recurrences for Taylor coefficients, by which a solver follows it for Karasev's bi-realisation.
+"""Recurrences for the Taylor coefficients of the path ṁ = π(m)p of Karasev's bi-realisation.
 
-Each node of the graph of π(m)p is a Taylor series in the time along the path. For sums and products, the coefficient of
-order k of a node follows from the coefficients of its arguments up to order k. For powers and functions it also needs
-the lower coefficients of the node itself. So the coefficients of m are computed one order after another, as many as the
-size of p requires.
+A solver follows the path by these recurrences. Each node of the expression graph of π(m)p is a Taylor series in the
+time along the path. For sums and products, the coefficient of order k of a node follows from the coefficients of its
+arguments up to order k. For powers and functions it also needs the lower coefficients of the node itself. So the
+coefficients of m are computed one order after another; a larger p requires more orders.
 """
 
 from __future__ import annotations

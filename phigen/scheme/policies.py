@@ -83,7 +83,9 @@ class PathPolicy(Policy):
     least_share: float = number(
         1e-5, "terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|"
     )
-    rounded_slope: float = number(2e-15, "rounding of the slope of a path, relative to the path and its slope")
+    rounded_slope: float = number(
+        2e-15, "largest rounding error of the slope at the end of a path, relative to end and slope"
+    )
     difference: float = number(
         1e-7, "difference of arguments in a difference quotient, relative to p: the square root of rounding"
     )
@@ -100,16 +102,16 @@ class GaussPolicy(Policy):
     """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
     compared."""
 
-    most_rising: int = count(3, "a step fails if (number of stages + this) changes in a row have grown")
+    most_rising: int = count(3, "a step fails if the change grows in (number of stages + this) sweeps in a row")
     solved: float = number(
         2e-18, "largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly"
     )
     stalled: float = number(
         0.8, "above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted"
     )
-    rounding: float = number(4e-16, "below this, sweeps end when a change exceeds STALLED times the last one")
+    rounding: float = number(4e-16, "below this, sweeps end when a change exceeds STALLED times the one before")
     nearly_rounding: float = number(
-        2e-14, "below this, sweeps end when a change is not smaller than the last one for the second time"
+        2e-14, "below this, sweeps end at the second change that is not smaller than the one before"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -129,8 +131,8 @@ class PlausibilityPolicy(Policy):
     energy.
     """
 
-    plausible: float = number(1.5, "longest accepted step, relative to |x| + |h dx/dt|")
-    max_energy_change: float = number(0.5, "largest relative change of energy in accepted longer steps")
+    plausible: float = number(1.5, "steps up to this are accepted, relative to |x| + |h dx/dt|")
+    max_energy_change: float = number(0.5, "longer steps may change the energy by at most this fraction")
 
 
 @dataclass(frozen=True)
@@ -141,12 +143,14 @@ class GaugeSearch(Policy):
     degree: int = count(6, "degree of the squared error in the factor of a Casimir, since S_3 is cubic in H")
     sweeps: int = count(4, "largest number of rounds; a round optimises each factor once")
     grids: int = count(
-        3, "number of grids in the search for a factor; each is finer by the factor MESH than the last one"
+        3, "number of grids in the search for a factor; each is finer by the factor MESH than the one before"
     )
     first_reach: int = count(24, "points of the first grid on each side of its centre")
     reach_of_grid: int = count(8, "points of later grids on each side of the best point so far")
     mesh: float = number(0.125, "distance of the points of the first grid, in units of the width |grad H|/|grad C|")
-    sample_length: float = number(0.25, "distance between successive sample states, relative to the size of the first")
+    sample_length: float = number(
+        0.25, "distance between successive sample states, relative to the size of the first state"
+    )
     close_call: float = number(
         1e-12,
         "errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide",
@@ -181,7 +185,7 @@ class GaussAdjointPolicy(Policy):
     adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
     adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "below this, sweeps end when a change exceeds ADJOINT_STALLED times the last one for the second time"
+        1e-12, "below this, sweeps end at the second change that exceeds ADJOINT_STALLED times the one before"
     )
 
 
@@ -189,7 +193,7 @@ class GaussAdjointPolicy(Policy):
 class PathTangentPolicy(Policy):
     """The Taylor series of a path together with its variation, for the derivatives of a step."""
 
-    tangent_negligible: float = number(1e-18, "terms below this fraction of start and sum are rounding")
+    tangent_negligible: float = number(1e-18, "terms below this fraction of |start| + |sum of the terms| are rounding")
     tangent_rounded_slope: float = number(
         1e-13, "accepted error of the slopes of a path and its variation, relative to path and slope"
     )
@@ -217,7 +221,7 @@ class LatticeNewtonPolicy(Policy):
     solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(
-        1.5, "solutions farther from x than this, relative to x and its first change, are rejected"
+        1.5, "largest accepted distance of a solution from x, relative to |x| + |first change of x|"
     )
 
 

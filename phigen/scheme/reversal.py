@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. An input has the same name: fields after the flow
-#: that no other part of the transposed flow reads.
+#: Name of an output of a transposed flow: the state before the flow. The transposed flow also has an input of this
+#: name. It consists of those fields after the flow that no other output reads.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1

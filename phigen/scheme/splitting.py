@@ -138,7 +138,7 @@ def _step(
     inputs = {"gauge": constant_symbols, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
     prepare = Kernel(
         "prepare",
-        "everything that depends on parameters and the time of a flow only",
+        "compute the coefficients that depend only on parameters and the duration of a flow",
         {"params": system.parameter_names, **{name: symbols for name, symbols in inputs.items() if symbols}},
         (Output("coef", tuple(coefficients.prepared)),),
         exponentials=coefficients.blocks,

@@ -59,7 +59,7 @@ def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
     return replace(
         relax,
         name=_BLOCK,
-        purpose="derivative of the iteration for y at a site by y at the same site",
+        purpose="the right-hand side of y = ... at a site, differentiated with respect to y at this site",
         outputs=(Output(_BLOCK, tuple(slopes)),),
         role=Role.OWN_SLOPE,
     )

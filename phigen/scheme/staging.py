@@ -147,7 +147,7 @@ class Coefficients:
         values = tuple(self._hoisted(self.renewed, self._is_fixed))
         return Kernel(
             "refresh",
-            f"everything that depends on {' and '.join(INPUTS[name] for name in inputs)}, but not on the state",
+            f"compute the coefficients that depend on {' and '.join(INPUTS[name] for name in inputs)}",
             {TABLE: self.slots, **{name: tuple(symbols) for name, symbols in inputs.items()}},
             (Output(NOW, values),),
         )

@@ -516,9 +516,10 @@ class Seam:
     """The boundary seam of a lattice along a periodic axis whose size is not a multiple of the ``period`` of the
     colouring.
 
-    The seam consists of the last sites: those left over after the last whole period, and as many more periods as make
-    it at least ``wide`` sites long. The terms of H that start on the seam are separate parts; they update the seam and
-    the sites within the distance ``near`` of it. All other terms are coloured as on a lattice without a seam.
+    The seam consists of the last sites of the axis. Let r be the remainder when the size is divided by the period. The
+    seam has r sites plus the smallest number of whole periods that makes it at least ``wide`` sites long. The terms of
+    H that start on the seam are separate parts; they update the seam and the sites within the distance ``near`` of it.
+    All other terms are coloured as on a lattice without a seam.
     """
 
     period: int = 1
@@ -527,8 +528,9 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size of the axis for which every remainder is possible: the longest seam and ``wide`` other
-        sites."""
+        """The smallest size of the axis above which no size is excluded: that of the longest seam, plus
+        ``wide`` sites.
+        """
         return 2 * self.wide + self.period - 1
 
 

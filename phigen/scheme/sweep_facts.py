@@ -41,11 +41,11 @@ def beside_seams(sweep: Sweep) -> bool:
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the code by which the runtime marks the sites that a sweep with a ``window`` updates, for the
-    colour 0.
+    """Return the code of the sites of colour 0 that a sweep with a ``window`` updates; None for a sweep without a
+    window.
 
-    The code of a site near seams is the bit mask of seams times the number of colours, plus the colour. Returns None
-    for a sweep without a window.
+    The runtime marks each site near seams with a code: the bit mask of these seams times the number of colours, plus
+    the colour of the site.
     """
     return None if sweep.window is None else sweep.window * sites.colours
 
@@ -126,7 +126,8 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 def ways(step: Sweeps) -> list[tuple[int, int]]:
     """Return a pair of parts for each flow of a step: the part of this flow, and the part of the next flow.
 
-    The last flow of a step is merged with the first flow of the next step. A last pair is for this merged flow.
+    The last flow of a step is merged with the first flow of the next step. The last pair of the result belongs to this
+    merged flow.
     """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
