@@ -191,7 +191,8 @@ def _remainder(
     shifting = [t for t in terms if positions.issuperset(ring.support(t.element))]
     other_terms = [t for t in terms if t not in shifting]
     if moving and not remainder.is_zero and terms:
-        raise _NoBodiesError(f"the further term {shortened(terms[0].expression)} may not commute with p_0**2/(2*m_0)")
+        first = shortened(terms[0].expression)
+        raise _NoBodiesError(f"the further term {first} is not offered, since it may not commute with p_0**2/(2*m_0)")
     h = total([remainder, *(t.expression for t in shifting)])
     if h.is_zero and not other_terms:
         return None

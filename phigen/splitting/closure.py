@@ -1,9 +1,10 @@
-"""Linear equations for coordinates along the flow of a part of H, found by repeated differentiation of monomials.
+"""Linear equations for coordinates along the flow of a part G of H, found by repeated differentiation of
+monomials.
 
-The derivative of a coordinate along π∇G is a polynomial in the variables that move, and each new monomial in it is
-added to a list. If this ends, the monomials w in the list satisfy ẇ = Aw, and A contains only quantities that are
-constant along the flow. Kicks, drifts, rotations, shears and scalings are special cases, as are triangular polynomial
-equations.
+The derivative of a coordinate along the field π∇G is a polynomial in the variables that change along the flow. Each new
+monomial in it is added to a list, and differentiated in turn. If at last no new monomials occur, the monomials w in the
+list satisfy ẇ = Aw, and A contains only quantities that are constant along the flow. Kicks, drifts, rotations, shears
+and scalings are special cases, as are triangular polynomial equations.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ MIN_PAIRS_FOR_PROGRESS = 100
 
 
 class Conflicts:
-    """Cache of the decisions which pairs of terms of H commute.
+    """Cache of the decisions whether two terms of H commute.
 
     Many candidate groupings of H contain the same terms, so results for a term and for a pair are stored.
     """

@@ -16,8 +16,8 @@ from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 #: Times t at which exp(tA) − 1 is checked, as multiples of 1/‖A‖.
 TIMES = (1e-3, 1.0, 30.0)
 
-#: Largest accepted error of exp(tA) − 1, relative to its norm and in units of the machine precision, divided by the sum
-#: of ‖tA‖ and the number of rows.
+#: Largest accepted error of exp(tA) − 1. The error is relative to the norm of exp(tA) − 1, is measured in units of the
+#: machine precision, and is divided by the sum of ‖tA‖ and the number of rows.
 UNITS = 8.0
 
 #: Precision of the ball arithmetic in bits.

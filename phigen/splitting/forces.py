@@ -2,13 +2,14 @@
 of this field.
 
 The whole field is one part if phigen knows its flow, in closed form or by a matrix exponential. Otherwise πζ and f are
-separate parts. If phigen does not know the flow of one of the two, its summands are parts: πζ_i dx_i for each component
-of ζ, or the components of f. π times ζ_i dx_i is the Hamiltonian field of x_i times a factor. It is tangent to the
-symplectic leaves, so each summand of πζ preserves the Casimirs.
+separate parts. If phigen does not know the flow of πζ, its summands πζ_i dx_i are parts, one for each component of ζ;
+if it does not know the flow of f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i
+times a factor. It is tangent to the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping is ζ = λπb with b = ∇H. If its flow is not known, b is divided for each block of π: into the terms that do not
-depend on the coordinates of the block, and the components of the remaining terms. Two flows become one part if neither
-changes a coordinate that the other reads.
+Damping is ζ = λπb with b = ∇H. If its flow is not known, b is divided into summands for each block of π. One summand
+has the terms of b that do not depend on the coordinates of the block. The remaining terms are one more summand or, if
+that has no flow, one summand for each component of b. Two flows become one part if neither changes a coordinate that
+the other reads.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from phigen.symbolic.readable import shortened
 Field = tuple[Expression, ...]
 
 _DAMPING_HINT = (
-    "damping of a spin has a flow if H is linear in it, or quadratic along an axis; scheme: series applies to every H"
+    "damping of a spin has a flow if H is linear in the spin, or quadratic along an axis; "
+    "scheme: series applies to every H"
 )
 
 

@@ -1,9 +1,9 @@
 """Other forms of H as a sum of terms, which may need fewer parts.
 
-*Companions* are quadratic functions C that do not affect the other terms: a Casimir has no flow, and |P|² on se(3)*
-commutes with every function of P. In H = λC + (H − λC), a suitable λ cancels a term that does not commute with others.
-For example, the free rigid body then has two parts instead of three. C is a Casimir of π, or of the brackets of some
-coordinates that are closed under brackets.
+*Companions* are functions C that do not affect the other terms. One example is a Casimir, whose flow changes nothing.
+Another example is |m|² on se(3)*, where m is the angular momentum: |m|² commutes with every function of m. In H = λC +
+(H − λC), a suitable λ cancels a term that does not commute with others. For example, the free rigid body then has two
+parts instead of three. C is a Casimir of π, or of the brackets of some coordinates that are closed under brackets.
 
 *Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """

@@ -115,8 +115,9 @@ class RelativeMotions:
         """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
         motion.
 
-        The first ones vanish if the changes ``spread`` change the forms Q_i and P_i by the changes that their symbols
-        denote. The others are the identities of Kepler motions.
+        ``spread`` has the changes of the Cartesian coordinates for given changes of the Q_i and P_i. The first
+        expressions vanish if the forms Q_i and P_i of these Cartesian changes are the given changes. The others are the
+        identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
