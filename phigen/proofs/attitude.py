@@ -202,10 +202,10 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield the rates of the coordinates of free rigid bodies along the flows of the other terms of the same
-    part of H.
+    """Yield pairs of a label and an expression; all expressions vanish if the free rigid bodies of a part of H do not
+    move in the flows of its other terms.
 
-    All rates must be 0.
+    The expressions are the rates of the coordinates of these bodies.
     """
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))

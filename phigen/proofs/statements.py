@@ -60,10 +60,10 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
-    """Return the statement that the damping coefficient λ is not negative, evaluated at ``starts``.
+    """Return the statement that the damping coefficient λ is not negative, decided by its values at ``starts``.
 
-    ``starts`` are values of coordinates, parameters and times. The result is {} without damping, or if the sign of λ is
-    unknown.
+    Each of the ``starts`` has values of coordinates, parameters and times. The result is {} without damping, or if the
+    sign of λ is unknown.
     """
     rate = spec.forces.damping
     if rate is None:

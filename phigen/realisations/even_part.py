@@ -153,10 +153,10 @@ def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
 
 
 def _may_have_root(matrix: Sequence[Vector]) -> bool:
-    """Whether (tr M²)² is one of 1, …, n times tr M⁴ at a sample point, as is necessary for a single nonzero eigenvalue
-    of M².
+    """Whether (tr M²)² = k tr M⁴ for some k = 1, …, n at a sample point, where n is the number of rows of M.
 
-    This test comes first, since symbolic squares of large matrices take long.
+    If M² has a single nonzero eigenvalue, this holds, and k is its multiplicity. The test comes first, since symbolic
+    squares of large matrices take long.
     """
     flat, n = [e for row in matrix for e in row], len(matrix)
     try:

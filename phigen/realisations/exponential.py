@@ -4,11 +4,11 @@ With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
 
     α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
 
-No matrix representation is needed. For linear π this is Karasev's construction. It is exact for linear H (S_t = tH). On
-so(3), so(4) and se(3) its error constants are 8 to 700 times smaller than those of the Cayley transform. An affine π,
-given by a Lie algebra with a cocycle, is treated as the hyperplane z = 1 in the dual of the central extension. b(M_p)x
-is written in closed form where `phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ =
-π(m)p numerically.
+No matrix representation is needed. For linear π this is Karasev's construction. Steps are exact if H is linear, since
+then S_t = tH. On so(3), so(4) and se(3) the error constants of the exponential are 8 to 700 times smaller than those of
+the Cayley transform. An affine π, given by a Lie algebra with a cocycle, is treated as the hyperplane z = 1 in the dual
+of the central extension. b(M_p)x is written in closed form where `phigen.realisations.even_part` has a formula;
+otherwise the solver follows the path ṁ = π(m)p numerically.
 """
 
 from __future__ import annotations
