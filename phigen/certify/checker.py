@@ -26,7 +26,7 @@ U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(
 ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the C computes
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
 POINTS = (0.318309886, 0.577215665, 0.869604401)  # fractions of a box, at which derivatives are compared
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions of glibc with twice the documented error of other functions
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions whose error, as documented by glibc, is twice that of the others
 # the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
@@ -83,7 +83,7 @@ def square(x: Ball) -> Ball:
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """Return an interval that contains the maximum of any numbers, one from each of the given intervals."""
+    """Return an interval that contains the maximum of x_1, x_2, … if each x_i lies in interval number i."""
     return reduce(arb.max, values)
 
 
@@ -347,11 +347,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return contraction rate and rounding noise of the corrections in the norm of the C, and 2-norm / norm of
-    the C.
+    """Return, for the corrections of an implicit stage, bounds for the contraction rate and for the rounding noise, and
+    a factor between norms.
 
-    ``factor`` bounds one correction by the correction before. The norm of the C is the root mean square over the stages
-    of a Gauss method; for other methods it is the maximum, and the third result is 1.
+    The bounds are in the norm by which the C measures corrections: for a Gauss method the root mean square over its
+    stages, for other methods the maximum. The factor is the 2-norm divided by the norm of the C for a Gauss method, and
+    1 for other methods. ``factor`` bounds one correction by the correction before.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]

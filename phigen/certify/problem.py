@@ -29,7 +29,8 @@ _FLOWS = {
     ANOMALY: "a Kepler motion",
 }
 
-#: Motions that a named composition (key ``composition`` of specs) splits into parts, which certificates cover.
+#: Motions that can be split into parts, by a composition that the key ``composition`` of specs names. Certificates
+#: cover the flows of these parts.
 _SPLIT = ("a free rigid body", "a Kepler motion")
 
 
@@ -80,7 +81,7 @@ def _expect_covered(program: Program, spec: Spec) -> None:
         refusals.append((("order",), message, "set order: 12, or profile: small"))
     flows = {_FLOWS[e.op] for kernel in program.kernels for e in topological(kernel.roots) if e.op in _FLOWS}
     for flow in sorted(flows):
-        hint = "scheme: series, or composition: suzuki, which splits it" if flow in _SPLIT else "scheme: series"
+        hint = "scheme: series, or composition: suzuki, which splits the motion" if flow in _SPLIT else "scheme: series"
         refusals.append((("scheme",), f"certificates do not cover the exact flow of {flow}", hint))
     if refusals:
         raise SpecError([spec.diagnostic(path, message, hint) for path, message, hint in refusals])

@@ -45,7 +45,7 @@ GAUSS_CARRY = 3.03
 LEAST_REACH = 0.05
 
 #: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for steps whose C
-#: uses finite differences. The addition exceeds the distances of these differences.
+#: uses difference quotients. The addition exceeds the distances of the points at which these quotients are evaluated.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.

@@ -299,8 +299,8 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Names of C functions that are read, by kind of step. The kind of a solver is the first one whose last function the C
-#: has.
+#: Names of C functions that are read, by kind of step. A solver is of the first kind in this table for which the C has
+#: the last function in the list.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
