@@ -14,7 +14,8 @@ from phigen.symbolic.expression import Expression
 #: Arguments of kernels that are single numbers, not arrays: h is the step size or the duration of a flow, t the time.
 SCALARS = ("h", "t")
 
-#: Input of a transposed kernel: the cotangents of the entries of those matrices tA whose exponentials are coefficients.
+#: Input of a transposed kernel. If coefficients are entries of matrix exponentials exp(tA), this input has the
+#: cotangents of the entries of the matrices tA.
 EXPONENTS = "exponents_bar"
 
 

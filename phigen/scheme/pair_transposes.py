@@ -30,13 +30,13 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 def transposed_at_ends(
     places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], transpose: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
-    """Return the loops that collect cotangents at each site: the end at which the site lies, the bonds or pairs, and
-    the kernel.
+    """Return the loops over the bonds or pairs of a site that collect its cotangents: for each loop the end at which
+    the site lies, the bonds or pairs, and the kernel.
 
     Each site collects the cotangents that it receives, so no two sites write to the same place. If the bonds of a site
     are the same at both ends, there is one loop; its kernel also computes the sums themselves if they are to be
-    ``summed``. Otherwise there are two loops: the first treats the site as the end b and reads the cotangents of the
-    sites at a, the second treats the site as the end a.
+    ``summed``. Otherwise there are two loops. In the first loop the site is the end b of the bonds, and the cotangents
+    of the sites at the ends a are read. In the second loop the site is the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)

@@ -30,9 +30,9 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
-    """Return the renaming of the symbols of noise increments that accompanies a permutation of the fields.
+    """Return new names for the symbols of noise increments, for a permutation of the fields.
 
-    The symbol for ``fields[k]`` becomes the symbol for the field ``order[k]``. The renaming is empty unless each field
+    The symbol for ``fields[k]`` becomes the symbol for the field ``order[k]``. The result is empty unless each field
     has exactly one source of noise.
     """
     if len(sites.increments) != len(order):
