@@ -1,7 +1,7 @@
 """Units of the errors of energy, Casimirs and invariants, for measurements, tables and figures.
 
-An error is relative to the value of the quantity at the start. If this value is much smaller than the terms that it is
-the sum of, as for an energy near its arbitrary zero, the error is relative to the size of the terms. For a system, this
+An error is relative to the value of the quantity at the start. If the terms of the quantity nearly cancel at the start,
+as for an energy near its arbitrary zero, the error is relative to the size of the terms instead. For a system, this
 size is Σ |x_i ∂_i H| at the start: the change of H by a relative change of all coordinates, which does not depend on
 constants in H. For a lattice it is the sum of the absolute energies of the sites. If this size is 0 too, the error is
 absolute.

@@ -5,7 +5,7 @@ With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i on (x, p)
 
     α(x, 0) = β(x, 0) = x,   {α_i, α_j} = π_ij∘α,   {β_i, β_j} = −π_ij∘β,   {α_i, β_j} = 0
 
-(paper, section "Bi-realisation I", definition 1).
+(the article `PAPER` in `phigen.realisations.protocol`, section "Bi-realisation I", definition 1).
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ the algebra. Then α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that i
 
 This requires that P E_i P lies in the algebra for all P or, equivalently, that E_a E_i E_b + E_b E_i E_a does for all
 a, i, b. The condition holds for so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), but not for sl(3).
-The paper (example so(n)) prints 4 instead of 2 in τ.
+The article `PAPER` in `phigen.realisations.protocol` prints 4 instead of 2 in τ (example so(n)).
 """
 
 from __future__ import annotations

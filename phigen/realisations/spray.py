@@ -1,13 +1,13 @@
 """Poisson sprays and Moser's trick: a bi-realisation from the flow Φ of a vector field X on T*U.
 
 The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadratic in p. Let ω = Σ dx_i ∧ dp_i and τ(x, p) = x.
-The paper (section "Poisson Spray and Moser's trick") takes α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and ψ with ψ*Ω = ω; then
-α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
+The article `PAPER` in `phigen.realisations.protocol`, section "Poisson Spray and Moser's trick", has α̅ = τ, β̅ = τ∘Φ¹,
+Ω = ∫₀¹ Φˢ*ω ds, and a map ψ with ψ*Ω = ω; then α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
 
     α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
 
-The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. ψ is
-not, although the paper says so: it changes x by −½πp.
+The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. ψ
+is not, although the article says so: ψ changes x by −½πp.
 
 If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. With a flow in closed form this gives the constant and the log-canonical
 bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat spray (f = 0), Ω₀ = Σ d(mean_i

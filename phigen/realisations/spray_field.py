@@ -1,8 +1,8 @@
 """A Poisson spray as a vector field X on T*U: its construction from a spec, the checks, and Lie series along it.
 
 X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l. So its x components are πp, and X is
-homogeneous: it raises the degree in p by 1 (paper, section "Poisson Spray and Moser's trick"; the example there sums
-over i < j, where all i, j are meant).
+homogeneous: it raises the degree in p by 1. The article `PAPER` in `phigen.realisations.protocol` defines sprays in the
+section "Poisson Spray and Moser's trick". The example of that section sums over i < j, where all i, j are meant.
 """
 
 from __future__ import annotations
