@@ -351,8 +351,8 @@ class CompiledSplitting(_CompiledSystem):
     def symmetric(self) -> bool:
         """Whether a step of size −h is the inverse of a step of size h.
 
-        If the method has a corrector (a map before the first step, whose inverse follows the last), this holds only up
-        to terms of order ε², where ε is the size of the small part of H.
+        If the method has a corrector (a map after the last step, whose inverse comes before the first step), this
+        holds only up to terms of order ε², where ε is the size of the small part of H.
         """
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2

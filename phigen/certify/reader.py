@@ -338,7 +338,7 @@ def _gauss(source: GeneratedC) -> dict[str, Any]:
 def _splitting(source: GeneratedC) -> dict[str, Any]:
     """Return the tables of a splitting: times of flows, sequences of flows, and the coordinates that each flow changes.
 
-    A method with a corrector has three sequences (corrector, step, inverse corrector), other methods have one.
+    A method with a corrector has three sequences (inverse corrector, step, corrector), other methods have one.
     """
     row = int(source.number("ROW"))
     schedules = [_schedule(source, "flows", {"coef": 0, "ROW": row})]

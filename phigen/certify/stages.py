@@ -137,7 +137,7 @@ def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stages of a step by splitting: one, or three if corrector and inverse corrector enclose it.
+    """Return the stages of a step by splitting: one, or three if the inverse corrector and the corrector enclose it.
 
     In a stage, the flows add their changes to a sum that begins with the compensation term.
     """

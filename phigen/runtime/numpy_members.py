@@ -98,8 +98,9 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Apply the corrector of the method, if it has one. A corrector is a map at the start of a sequence of
-        steps.
+        """Apply the inverse of the corrector of the method, if it has one, before a sequence of steps.
+
+        A corrector is a map at the end of a sequence of steps.
         """
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
@@ -107,7 +108,7 @@ class MemberBatch:
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the inverse of the corrector, a map that was applied before a sequence of steps.
+        """Apply the corrector of the method, if it has one: a map whose inverse was applied before a sequence of steps.
 
         Members whose result is not finite fail, and get back their states from before the sequence.
         """
@@ -122,8 +123,8 @@ class MemberBatch:
     def _state(self) -> tuple[Floats, Floats]:
         """Return the states of the remaining members, and the compensation terms of these states.
 
-        If the method has a corrector, a map before the first step, its inverse is applied to the states that are
-        returned.
+        If the method has a corrector, a map after the last step, the returned states are those to which the corrector
+        has been applied.
         """
         if not self._running:
             return self.x, self._carry

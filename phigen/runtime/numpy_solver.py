@@ -182,10 +182,10 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Apply the corrector of the method, make steps, and apply the inverse of the corrector.
+        """Make steps between the inverse of the corrector of the method and the corrector.
 
-        The corrector is a map before the first step; its inverse is applied after the last step. If no step succeeds,
-        or if one of these two maps fails, the state is unchanged.
+        The inverse is applied before the first step, and the corrector after the last step. If no step succeeds, or if
+        one of these two maps fails, the state is unchanged.
         """
         start, status = (self._x, self._carry, self.steps), ""
         try:
@@ -207,8 +207,9 @@ class NumpySession:
     def _follow(self, flows: str) -> None:
         """Apply the corrector of the method, or its inverse, to the state.
 
-        A corrector is a map before the first step of a run. The module has the flows of this map in a list
-        with the name ``flows``.
+        A corrector is a map after the last step of a run; its inverse comes before the first step. The generated module
+        has the flows of the map to apply in a list with the name ``flows``: "BEGIN" for the inverse, "END" for the
+        corrector.
         """
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
@@ -234,7 +235,7 @@ class NumpySession:
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         if hasattr(self._module, "_followed"):
-            self.advance(h, 1)  # repeats the step with the corrector before it and its inverse after it
+            self.advance(h, 1)  # repeats the step with the inverse of the corrector before it, the corrector after it
         else:
             self._commit(x, carry, memory, stages)
         return tangent

@@ -100,8 +100,8 @@ static phi_status phi_stages(phi_solver *s)
 }
 
 #if PHI_CORRECTED
-/* Apply the corrector before the steps of a run (after = 0), or its inverse after them (1). If it fails, the state is
-   unchanged. */
+/* Apply the flows of the corrector before the steps of a run (after = 0) or after them (after = 1). If it fails, the state
+   is unchanged. */
 static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
 {
     double x[PHI_DIM], displacement[PHI_DIM];
@@ -113,7 +113,7 @@ static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
     return PHI_OK;
 }
 
-/* End a run that started at `before`, by the inverse of the corrector. Returns the status of the last step or, if it fails,
+/* End a run that started at `before`, by the flows of the corrector. Returns the status of the last step or, if it fails,
    of the corrector. If no step succeeded, or if the corrector fails, the state before the run is restored. */
 static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_TAPE)
 {
