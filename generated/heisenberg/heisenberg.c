@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: f8a047084425d8d857638f5e76ff4e0606af1410c6f0c9e0b8d7ab41a3b24e9d
+ * body-sha256: a6e4383c96486b07ef19c467e324dca24626e1ec7734bf4670c62e42bc51f042
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -85,7 +85,7 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* Copy changed sites from ... to - 1 to the halo at the opposite end; at open ends the halo has weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)

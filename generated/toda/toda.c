@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 0856c5b56cccb0036d9c694ab94a05a468598fe5b6993bc474b877458318a2b1
+ * body-sha256: 794191478c428b40d89aed0512c9e87dfd0839fdc89b31ba0498537a7a4b685b
  */
 #include "toda.h"
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* Copy changed sites from ... to - 1 to the halo at the opposite end; at open ends the halo has weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)

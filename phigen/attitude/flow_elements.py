@@ -171,7 +171,10 @@ def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning
 
 
 def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expression]:
-    """Yield each number c for which the second derivative of h − c q with respect to one of the coordinates is 0."""
+    """Yield each constant c ≠ 0 for which the second derivative of h − c q with respect to one of the coordinates is 0.
+
+    c may depend on parameters.
+    """
     curvatures: list[Expression] = []
     for name in system.coordinates:
         numerator, denominator = (derivative(derivative(e, name), name) for e in (h, q))

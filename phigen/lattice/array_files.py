@@ -1,7 +1,7 @@
 """Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
 
-A file with wrong contents raises `ValueError`; for a ``.csv`` file the message has the number of the wrong line. A file
-that cannot be read raises `OSError`.
+A file with wrong contents raises `ValueError`. If one line of a ``.csv`` file is wrong, the message has its number. A
+file that cannot be read raises `OSError`.
 """
 
 from __future__ import annotations

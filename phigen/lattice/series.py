@@ -41,7 +41,7 @@ class SeriesPlan:
     """Plan of a step by the series: the bi-realisation, and the composition of stages of order 2.
 
     ``fractions`` are the durations of the stages in units of the step. A stage solves α(y, h∇H(y)) = x for y.
-    ``middle`` is y at a site, as a formula in y at neighbouring sites and x at the site (the symbols `initial`).
+    ``middle`` is y at a site, as a formula in x at the site (the symbols `initial`) and in y at the site and around it.
     ``increment`` is the increment of x in the stage. ``middle`` and ``increment`` have an entry for each field, and the
     symbol `TIME` for the duration of the stage.
     """

@@ -356,10 +356,11 @@ def element_statements(
 def _residuals(
     group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
 ) -> Iterator[tuple[str, Expression]]:
-    """Yield the momentum after a step minus the momentum before, times |τ|² for the quaternion τ of the attitude
-    increment.
+    """Yield residuals that are 0 if a step conserves the momentum, in the frame in which it is constant.
 
-    For se(3) the differences are also multiplied by |g₀|², for the quaternion g₀ of the attitude before the step.
+    They are the values of the momentum, or of each rotated vector, after the step minus the values before. They are
+    multiplied by |g₀|²|τ|², for the quaternions g₀ of the attitude before the step and τ of the attitude increment. For
+    se(3) the residuals of the angular momentum are computed for g₀ = 1, and are multiplied by |τ|⁴.
     """
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)

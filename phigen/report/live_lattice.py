@@ -192,7 +192,8 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
     """Return the sizes that the panel offers, in ascending order.
 
-    If an initial value or a parameter of the run is a list, only the sizes of the run are offered.
+    If the run has a graph, or takes an initial value or a parameter from a list or a file, only the sizes of the run
+    are offered.
     """
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))

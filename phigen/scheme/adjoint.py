@@ -172,8 +172,8 @@ def completed(
 def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
     """Return the transpose of ``prepare``, the kernel that computes the coefficients from the parameters.
 
-    If some coefficients are entries of matrix exponentials exp(tA), the transpose also reads the cotangents of the
-    matrices tA.
+    If some coefficients are entries of matrix exponentials exp(tA), and the matrices tA depend on these parameters, the
+    transpose also reads the cotangents of the matrices tA.
     """
     table_values = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]

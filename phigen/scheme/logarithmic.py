@@ -109,8 +109,9 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
 
 
 def composition_of(requested: str, order: int) -> str:
-    """Return the name of the composition of a splitting with the monitor ``log``: if the spec asks for ``auto``, a
-    composition of Strang's splitting.
+    """Return the name of the composition of a splitting with the monitor ``log``.
+
+    It is the ``requested`` one or, if the spec asks for ``auto``, a composition of Strang's splitting.
 
     Steps of Strang's splitting of K stay on the orbit of a Kepler motion for every step size; steps of other methods
     need not.

@@ -219,6 +219,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
     """Yield two checks of the energy or of the energy balance: of its largest error, and of its drift.
 
+    If ``errors`` only has the change of the energy, the single check reports the largest change, without a limit.
     ``least`` is the relative error that rounding may cause.
     """
     quantity = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)

@@ -8,7 +8,8 @@ from typing import Any
 #: Symbols of one kind differ by a key, such as the name of a coordinate.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
-#: Kind of the entries of exp(tA) − 1 for a constant matrix A. The key is the number of the matrix, row and column.
+#: Kind of the entries of exp(tA) − 1 for a constant matrix A. The key is a digest of A, and the index of the entry in
+#: the list of all entries, row by row.
 EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site, which is a part of the gradient. The

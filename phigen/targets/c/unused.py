@@ -30,8 +30,8 @@ class Function:
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
     """Return the lines without unused static functions, and without declarations of functions that are not defined.
 
-    A static function is unused if nothing but unused functions calls it. A declaration is only removed if the name of
-    the function begins with ``prefix``, that of the solver.
+    A static function is unused if nothing but unused functions calls it. Only functions whose names begin with
+    ``prefix``, that of the solver, are removed.
     """
     declarations = [*declarations_of(lines)]
     functions = [f for f in declarations if f.name.startswith(prefix)]

@@ -35,7 +35,7 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
-/* Copy changed sites from ... to - 1 to the halo at the opposite end; at open ends the halo has weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
 #if PHI_OPEN_ROWS

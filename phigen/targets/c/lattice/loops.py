@@ -199,8 +199,8 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        Sums over bonds or pairs are computed beforehand, for all sites. But if nothing else needs these sums, each site
-        computes its own sums in this function.
+        First it calls the functions that compute sums over bonds or pairs. On a graph without implicit stages nothing
+        else needs these sums; there, they are computed in inner loops over the bonds of each site.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

@@ -158,7 +158,9 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 
 def model(program: Program, step: Sweeps) -> str:
-    """Return the text of the tables, and of the functions that are called before the first step."""
+    """Return the text of the tables, and of the functions that check parameters, compute coefficients, or are
+    elementary functions that loops call.
+    """
     layout = layout_of(program, step)
     has = switches(layout)
     values = {
