@@ -235,8 +235,8 @@ class _Domain:
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
         """Return the first plane of this process and the plane after its last.
 
-        The colours of sites repeat after some number of planes. Each process has a multiple of this number of planes,
-        and all processes have nearly the same number.
+        The colours of sites repeat after some number of planes. Each process but the last has a multiple of this number
+        of planes, and all processes have nearly the same number.
         """
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):

@@ -268,7 +268,10 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 
 
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
-    """Return the sums of the two ends of a bond as a single one, if they are proved to be equal; else return both."""
+    """Return the sums of the two ends of a bond as a single one, if they are proved to be equal; else return both.
+
+    Sums that are 0 are left out. Two sums with ``chosen`` equal to ``here`` stay separate.
+    """
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
     completed = [s for s in completed if any(not e.is_zero for e in s.values.values())]
