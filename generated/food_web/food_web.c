@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: ccf1b918c7efa58597a8deb9103f88105a1d16ded59144a7990d8933c315cb6e
+ * body-sha256: 4ddc2caea1c334de3ac72f202106c8970af57b41f9fa278c7b9017e46089d69e
  */
 #include "food_web.h"
 #include <limits.h>
@@ -499,7 +499,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    /* if s->open, continue from s->before: its last flow is merged with the next one */
+    /* if s->open, continue before the last flow, which is merged with the next one */
     food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* makes the last flow; s->before stays without it */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: a6e4383c96486b07ef19c467e324dca24626e1ec7734bf4670c62e42bc51f042
+ * body-sha256: 66e6aec393aa9863923c07ba38183ec639569e00f030901e1502b2a7fac3c78a
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -167,7 +167,7 @@ static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, siz
 /* number of work items for threads: the rows */
 static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
-/* Restrict a row to the sites from ... to - 1, for a loop over them that is rounded up to whole vectors of 8.
+/* Restrict a row to the sites i with from <= i < to. The loop over them is rounded up to whole vectors of 8.
    Excess sites lie in the halo, which is updated afterwards. */
 static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrdiff_t from, ptrdiff_t to)
 {
@@ -852,7 +852,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    /* if s->open, continue from s->before: its last flow is merged with the next one */
+    /* if s->open, continue before the last flow, which is merged with the next one */
     heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* makes the last flow; s->before stays without it */

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 02039ff25d39ec1a0574e9c0534b36ad41ef43c52594e57ec0b1d50db92e638c
+ * body-sha256: e73453d8817726fd70193d8318820d8e23a6554f68ce1a5ffe5e8b3d30b5ab3b
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -59,8 +59,8 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
-/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). For fixed e, a step is an
-   exact Poisson map. */
+/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). Steps with the same e have
+   the same K. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);

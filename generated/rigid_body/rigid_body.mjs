@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6fbfa5f98ab5f2f4e0edae4240fdce15f97474af8d60c266bd12dde405c1d91b
+ * body-sha256: db3518917a5640f226758c46a8ff281244f7e78b86fccd6c5a1d43154764bb61
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -614,7 +614,7 @@ export class Solver {
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * @param {ArrayLike<number>} [options.gauge] the Casimirs, times these factors, are subtracted from H; by default
-   *   the factors follow from x0. For fixed factors the step is an exact Poisson map
+   *   the factors follow from x0. All steps with the same factors have the same Hamiltonian
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);

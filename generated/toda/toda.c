@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 794191478c428b40d89aed0512c9e87dfd0839fdc89b31ba0498537a7a4b685b
+ * body-sha256: d4ef846bed33cffdf472a9ed8dd782df938e1ca9d3240f760adeac8cf33914ac
  */
 #include "toda.h"
 #include <math.h>
@@ -388,7 +388,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    /* if s->open, continue from s->before: its last flow is merged with the next one */
+    /* if s->open, continue before the last flow, which is merged with the next one */
     toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* makes the last flow; s->before stays without it */

@@ -32,7 +32,8 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
     if not spec.lattice:
         raise click.BadParameter(f"{spec.name} is not a lattice, so it has no sizes", param_hint=OPTION)
     if spec.lattice.graph:
-        raise click.BadParameter(f"{spec.name} is a graph, whose sites are those of its bonds", param_hint=OPTION)
+        message = f"{spec.name} is a graph, whose size follows from its bonds and cannot be chosen"
+        raise click.BadParameter(message, param_hint=OPTION)
     sizes = typed_sizes(text)
     if sizes is None:
         raise click.BadParameter(f"{text!r} does not state sizes, such as 64x64", param_hint=OPTION)

@@ -421,7 +421,10 @@ def _quarter(s: Expression) -> Expression:
 
 
 def _doubled(s: Expression) -> Expression:
-    """Return φ(s) as a function of c = 1 − φ(s/4)s/4: with w = √s/4, c = w cot w and 2w cot 2w = (c² − w²)/c."""
+    """Return φ(s) = (1 − 2w cot 2w)/s with w = √s/4, computed from φ(s/4).
+
+    The doubling formula is 2w cot 2w = (c² − w²)/c with c = w cot w = 1 − φ(s/4)s/4.
+    """
     c = symbol(Symbol("cosine"))
     return (ONE - (c**2 - s / 16) / c) / s
 

@@ -34,7 +34,7 @@ MAX_COLUMNS = 1000
 
 
 class FrameRows:
-    """Rows of a run with the state, its energy and its observables: a `phigen.runtime.lattice_run.Sink`."""
+    """Sink that collects the rows of a run of a lattice: each row has a state, its energy and its observables."""
 
     def __init__(self, frames: Frames | GrowingFrames, seconds: float = 0.0) -> None:
         self.frames, self.seconds = frames, seconds

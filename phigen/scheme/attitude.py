@@ -30,8 +30,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Text for generated code, about an output with the components p_i of a matrix P = Σ p_i E_i and one more entry. This
-#: last entry is a bound for the square of the size of P.
+#: Description, in generated code, of the last entry of an output: a bound for the square of the norm of a matrix P = Σ
+#: p_i E_i with basis matrices E_i. The other entries of the output are the components p_i.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
@@ -170,10 +170,10 @@ def _carrier(group: Group) -> tuple[Symbol, ...]:
 
 
 def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
-    """Return the group element of a step, minus 1, after one more flow.
+    """Return g − 1 for the group element g of a step after one more flow.
 
-    It is the product of the element before this flow, whose entries are symbols, and of the elements of the flow over
-    ``time``.
+    g is the product of the element before this flow, whose entries are symbols, and of the elements by which the flow
+    over ``time`` acts.
     """
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before

@@ -82,11 +82,12 @@ class FreeGauge:
 
 @dataclass(frozen=True)
 class Monitor:
-    """Kernels of a monitored solver, whose steps have equal size in τ.
+    """Kernels of a solver with a monitor, whose steps have equal size in the rescaled time τ.
 
     ``rate`` is dt/dτ at a state. ``elapsed`` is the physical time of a step, as a function of the solution y of its
     implicit equation; in a splitting it is None, since the kernels of the flows return their time. ``level`` is the
-    gradient of H, for the transpose of the energy level e = −H(x₀), if gradients were requested.
+    gradient of H, or None if no gradients were requested. The reverse pass needs it, because the energy level e =
+    −H(x₀) depends on the start x₀.
     """
 
     rate: Kernel

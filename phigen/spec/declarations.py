@@ -61,7 +61,7 @@ class Declarations:
 
     @property
     def neighbours(self) -> Neighbours:
-        """Record that makes symbols of values at sites and their neighbours, for coordinates and for parameters."""
+        """The object that creates the symbols of coordinates and parameters at a site and at its neighbours."""
         at_sites = (n for n, p in self.parameters.items() if p.at == "sites")
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 

@@ -14,9 +14,10 @@ EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site, which is a part of the gradient. The
 #: other kinds have the value 1 or 0. PRESENT: 1 if no site that a term reads lies beyond an open end. CHOSEN: 1 if a
-#: site of a graph has the colour whose flow is applied. BEGINS: weight of terms in the equation of motion of a site. It
-#: is 1 if the terms that begin at a second site belong to the part of H whose flow is applied. The key is the colour of
-#: the part and the offset of the second site. The weight depends on the position of sites relative to boundary seams.
+#: site of a graph has the colour whose flow is applied. BEGINS: weight, in the equation of motion of a site, of the
+#: terms of H that are written at a neighbour and read the site. It is 1 if these terms belong to the part of H whose
+#: flow is applied. The key of the symbol is the colour of that part and the offset of the neighbour. The weight depends
+#: on the position of the sites relative to boundary seams.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
 #: Kinds of inputs of transposed functions of lattices. AROUND: cotangent of the change of a field at a neighbour; the
 #: key is the number of the field and the offset. HERE and THERE: cotangents of a sum over bonds or pairs, at the site

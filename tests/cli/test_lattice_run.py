@@ -214,7 +214,7 @@ def test_sizes_that_do_not_fit_are_errors_of_the_command_line(phigen, chain, com
 
 
 def test_systems_without_sizes_say_so(phigen):
-    for name, said in (("kepler", "is not a lattice"), ("chiral_magnet", "whose sites are those of its bonds")):
+    for name, said in (("kepler", "is not a lattice"), ("chiral_magnet", "whose size follows from its bonds")):
         assert said in " ".join(phigen("run", name, "--sizes", "4").stderr.split())
 
 

@@ -330,7 +330,7 @@ FAR = {
     "kicks": (1, 1, True),  # all members, after some steps
     "splitting, saddle": (1, 12, False),  # the inverse flows lead to another state
     "splitting, damped": (1, 1, True),  # the reverse pass uses stored states, not inverse flows
-    "explicit": (1e7, 1, False),
+    "explicit": (1e9, 1, False),
     "newton, gauge": (1, 35, False),
     "path": (1, 15, False),
     "newton, composed": (1, 9, True),

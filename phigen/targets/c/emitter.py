@@ -35,9 +35,10 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Costs of blocks of steps: PASSES iterations over a block take, for each step of the block, as much time as one
-#: evaluation at a single point. PASSES_OF_CALLS is the same number for loops that call library functions, and for
-#: paths: a single evaluation of a path needs no derivatives of the path.
+#: Cost model of steps that are solved together in a block. While a solver evaluates one step alone, a block makes
+#: PASSES iterations for each of its steps. If the loop over the block calls library functions, which are not
+#: vectorised, it makes PASSES_OF_CALLS; the same number holds for steps along paths, since a step alone computes no
+#: derivatives of its path.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.

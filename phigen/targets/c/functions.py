@@ -92,7 +92,8 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
     Special functions are φ and its derivatives, the functions of `ENTIRE`, and for a splitting those that its flows
     call. On a ``device``, φ is computed without a tangent.
     """
-    # Only flows of ordinary systems are considered, since loops over sites have separate versions.
+    # Loops over the sites of a lattice call other versions of these functions, so only the flows of systems without a
+    # lattice count here.
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     names = special.used(program, unprinted)

@@ -1,6 +1,6 @@
-"""Rewriting of C for rules of MISRA C:2012, in the profile certified.
+"""Rewriting of C for the profile ``certified``, which follows three rules of MISRA C:2012.
 
-The result is an equivalent program that complies with three more rules:
+The result is an equivalent program:
 
 - 12.1: operators of different precedence in one expression have parentheses.
 - 15.6: the bodies of loops and conditionals have braces.

@@ -290,8 +290,9 @@ LATTICE = (
     ),
 )
 
-#: Blocks of the struct of a row segment, which is the argument of loops over its sites. The statements in ``reset``
-#: initialise the struct for a whole row of a solver s.
+#: Members of the C struct that describes a segment of a row of sites, in blocks that depend on features. Loops over the
+#: sites of the segment receive the struct as an argument. The statements in ``reset`` initialise the struct for a whole
+#: row of a solver s.
 ROW = (
     StateBlock(
         "x",

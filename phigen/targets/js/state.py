@@ -68,7 +68,7 @@ SOLVER = (
             "tCarry = 0;",
         ),
         ("tCarry",),
-        (Option("gauge", "ArrayLike<number>", "energy level e: for fixed e, a step is an exact Poisson map"),),
+        (Option("gauge", "ArrayLike<number>", "energy level e; steps with the same e have the same K"),),
     ),
     StateFields(
         "TIMED",
@@ -119,7 +119,7 @@ SOLVER = (
                 "gauge",
                 "ArrayLike<number>",
                 "the Casimirs, times these factors, are subtracted from H; by default\nthe factors follow from x0. "
-                "For fixed factors the step is an exact Poisson map",
+                "All steps with the same factors have the same Hamiltonian",
             ),
         ),
     ),

@@ -58,9 +58,9 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #if PHI_BETWEEN
 
 #if PHI_ONE_ROW
-/* Restrict a row to the sites from ... to - 1, for a loop over them. */
+/* Restrict a row to the sites i with from <= i < to, for a loop over them. */
 #else
-/* Restrict a row to the sites from ... to - 1, for a loop over them that is rounded up to whole vectors of 8. Excess sites
+/* Restrict a row to the sites i with from <= i < to. The loop over them is rounded up to whole vectors of 8. Excess sites
    lie in the halo, which is updated afterwards. */
 #endif
 static inline const phi_row *phi_between(phi_row *row, ptrdiff_t from, ptrdiff_t to)

@@ -53,7 +53,7 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
 #if PHI_MONITOR
-/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). For fixed e, a step is an exact Poisson map. */
+/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). Steps with the same e have the same K. */
 #elif PHI_GAUGE
 /* As phi_init, with a given gauge: steps subtract gauge[k] times Casimir k from H. */
 #endif
