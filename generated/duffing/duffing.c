@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 272b24e39245a8b2f20e0168ebf23dea65e708bf0e6455321f368ea5fdf747a9
+ * body-sha256: 0c6ce84aa5657a3a61a14fa7c16da3bffefc7f2f6c505eae42a8cea4d3f51141
  */
 #include "duffing.h"
 #include <float.h>
@@ -299,7 +299,7 @@ static duffing_status duffing_attempt(duffing_solver *s)
         const int stalled = previous < duffing_NEARLY_SOLVED && size > duffing_SHRINKING * previous;
         previous = size;
         if (!(remaining <= duffing_TOLERANCE || stalled)) continue;
-        double small[duffing_DIM] = { 0.0 }; /* correction of the increment and compensation term */
+        double small[duffing_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < duffing_DIM; ++i)
             for (int j = 0; j < duffing_DIM; ++j) small[i] -= slope[i * duffing_DIM + j] * delta[j];
         for (int i = 0; i < duffing_DIM; ++i) small[i] += s->carry[i];

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 0bd69702ba072e41eccc0483108d17ad241f4fdc01e65bc6a3f1591501f808d4
+ * body-sha256: 7c2de3f50906fadd5c45bfea5f47b227e56e298fe00fbf297e48af0288581b86
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -276,7 +276,8 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
             && size > predator_prey_SHRINKING * previous;
         previous = size;
         if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
-        double small[predator_prey_DIM] = { 0.0 }; /* correction of the increment and compensation term */
+        /* correction of the increment, plus the compensation term */
+        double small[predator_prey_DIM] = { 0.0 };
         for (int i = 0; i < predator_prey_DIM; ++i)
             for (int j = 0; j < predator_prey_DIM; ++j)
                 small[i] -= slope[i * predator_prey_DIM + j] * delta[j];

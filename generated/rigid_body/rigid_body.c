@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: ec456a68d0d41a23b2ecba3cac1098e5110ceb5b5d9eb4a8540fb747e2b62de5
+ * body-sha256: 21f58512ca7f16c9b37e36720ad3a0006f5c3e6194be5bd2a159c18b4f6f9858
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -704,7 +704,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
         const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
         if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
-        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment and compensation term */
+        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < rigid_body_DIM; ++i)
             for (int j = 0; j < rigid_body_DIM; ++j) small[i] -= slope[i * rigid_body_DIM + j] * delta[j];
         for (int i = 0; i < rigid_body_DIM; ++i) small[i] += s->carry[i];

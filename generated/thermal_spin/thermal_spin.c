@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 7f791d73511f1781caca127c769d9a08b7610c43fe9954acfcc08cb5c6dfff17
+ * body-sha256: a9f46933892f2d9e9551fea93e0abe31473196da45925d0e28172cbd5677b5af
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -332,7 +332,8 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
         const int stalled = previous < thermal_spin_NEARLY_SOLVED && size > thermal_spin_SHRINKING * previous;
         previous = size;
         if (!(remaining <= thermal_spin_TOLERANCE || stalled)) continue;
-        double small[thermal_spin_DIM] = { 0.0 }; /* correction of the increment and compensation term */
+        /* correction of the increment, plus the compensation term */
+        double small[thermal_spin_DIM] = { 0.0 };
         for (int i = 0; i < thermal_spin_DIM; ++i)
             for (int j = 0; j < thermal_spin_DIM; ++j) small[i] -= slope[i * thermal_spin_DIM + j] * delta[j];
         for (int i = 0; i < thermal_spin_DIM; ++i) small[i] += s->carry[i];

@@ -1,5 +1,5 @@
-"""Conversion of a compilation to the input for the search of a certificate; solvers without certificates are
-refused.
+"""Conversion of a compilation to the input of the search for a certificate. Kinds of solvers for which phigen has no
+certificates are refused.
 """
 
 from __future__ import annotations

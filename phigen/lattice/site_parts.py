@@ -326,8 +326,8 @@ class PartSearch:
         return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether a site with the colour of ``a`` has a bracket of field ``a`` with field ``b`` at a site with the
-        colour of ``b``.
+        """Whether {a, b} can differ from 0 for the field ``a`` at one site and the field ``b`` at another one, each at
+        a site of its own colour.
         """
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 

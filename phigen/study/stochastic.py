@@ -65,9 +65,9 @@ def observed_power(errors: Floats, size: float) -> float:
 def _along_lines(
     solver: Solver, x: Floats, parameters: Mapping[str, float], t0: float, h: float, increments: Floats
 ) -> Floats:
-    """Return the states (paths, DIM) at the ends of piecewise linear paths that begin at ``x`` (paths, DIM).
-
-    One RK4 step of size h is made for each piece. ``increments`` (paths, steps, draws) are those of the paths.
+    """Return the last states (paths, DIM) of solutions that begin at ``x`` (paths, DIM) and are driven by noise that is
+    linear in each step of size h. One RK4 step is made for each such piece; ``increments`` (paths, steps, draws) are
+    those of the noise.
     """
     backend, timed = solver.backend, bool(solver.interface.time)
     sources = len(solver.interface.noise)

@@ -57,7 +57,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         double factor[PHI_ELEMENT]; /* computed here, so that the processor overlaps it with the lines below */
         phi_factor(s PHI_AND_STAGE, y, factor);
 #endif
-        double small[PHI_DIM] = { 0.0 }; /* correction of the increment and compensation term */
+        double small[PHI_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < PHI_DIM; ++i)
             for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
         for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];

@@ -40,7 +40,7 @@ class Layout(RowLayout):
 
     @property
     def program(self) -> Program:
-        """The program of the lattice."""
+        """The program of the lattice: the kernels and stages of a step, of which the C consists."""
         return self.lattice.program
 
     @property
