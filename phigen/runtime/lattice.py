@@ -1139,7 +1139,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
         if error.step == 0 and error.status == "NOT_FINITE" and (so_far is not None or not self.interface.time):
             advice = self._undefined(error.states[-1], values, None if so_far is None else float(so_far.t[0])) or advice
-        if error.status == "NOT_FINITE" and len(error.states) and np.abs(error.states[-1]).max() > _LARGE_ANGLE:
+        in_loops_of_c = error.status == "NOT_FINITE" and self.target == "c" and len(error.states)
+        if in_loops_of_c and np.abs(error.states[-1]).max() > _LARGE_ANGLE:
             advice += "; loops of C compute sin and cos of angles up to 1e8"
         return StepError(f"{name}: {step_text}: {error.status}, {advice}", **facts)
 

@@ -64,8 +64,8 @@ def sweep(
     _expect_sense(result, runs.get(run), place, declared, incomplete=incomplete)
     if run in runs and (end := end_of_its_own(result, runs[run], monitored=monitored)):
         _fail((*place, "run") if raw.get("run") else place, end, declared, "give the run steps: instead")
-    if run in runs and (reason := average_obstacle(result, runs[run], monitored=monitored)):
-        _fail((*place, "keep"), reason, declared, "give the sweep a run with stride:, and without after:")
+    if run in runs and (obstacle := average_obstacle(result, runs[run], monitored=monitored)):
+        _fail((*place, "keep"), obstacle[0], declared, obstacle[1])
     return result
 
 
@@ -104,20 +104,20 @@ def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
     return ""
 
 
-def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
-    """Return the reason why a sweep cannot average observables over the rows of this run; "" if it can.
+def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tuple[str, str] | None:
+    """Return why a sweep cannot average observables over the rows of this run, and a hint; None if it can.
 
     A sweep averages over states after whole steps, or over its frames. With a monitor, it does not know the physical
     times of these states.
     """
     averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
-    if not averages:
-        return ""
-    if run.is_timed and not sweep.frames:
-        return f"{averages[0]}: sweeps average over whole steps, but the rows of the run {run.name} are at given times"
-    if monitored and run.average.after is not None:
-        return f"{averages[0]}: sweeps with a monitor do not know the physical times that average: after: needs"
-    return ""
+    if averages and run.is_timed and not sweep.frames:
+        reason = f"sweeps average over whole steps, but the rows of the run {run.name} are at given times"
+        return f"{averages[0]}: {reason}", "give the run stride: in place of every: or at:, or the sweep frames:"
+    if averages and monitored and run.average.after is not None:
+        reason = "sweeps with a monitor do not know the physical times that average: after: needs"
+        return f"{averages[0]}: {reason}", "remove after: from the run"
+    return None
 
 
 def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: str = "", *, limit: bool = False) -> None:

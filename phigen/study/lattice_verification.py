@@ -26,6 +26,7 @@ from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.study import gradients, lattice_noise, single_precision
 from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
+from phigen.study.methods import size_of
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification, order_limit
 from phigen.symbolic.arrays import Floats, evaluate
 
@@ -171,7 +172,7 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     step = subject.compilation.program.step.swept
     if step and len(step.parts) == 1 and not step.by_colour:
         return Check(name, math.inf)
-    order, x, size = subject.compilation.order.order, subject.start.state, _size(subject.start.state)
+    order, x, size = subject.compilation.order.order, subject.start.state, size_of(subject.start.state)
     span, slopes, measured_errors = 4 * abs(subject.h), dict[float, float](), list[float]()
     for _ in range(5):
         try:
@@ -246,7 +247,7 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
         held_level = _level_argument(subject.solver, x, subject.start.arguments)
         forward_state = subject.stepped(x, subject.h, 1, t0, held_level)
         returned_state = subject.stepped(forward_state, -subject.h, 1, time_after, held_level)
-        worst = max(worst, float(np.abs(returned_state - x).max()) / _size(x))
+        worst = max(worst, float(np.abs(returned_state - x).max()) / size_of(x))
     if subject.compilation.program.step.corrected:  # with a corrector, Φ₋ₕ is not exactly the inverse of Φₕ
         return Check("reversibility", worst, "", True, "")
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
@@ -266,7 +267,7 @@ def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Che
             x, t0 = trajectory.x[k], subject.time(trajectory, k)
             options: dict[str, Any] = {"t0": t0, "seed": subject.seed, "parameters": subject.start.arguments}
             a, b = (s.step(x, subject.h, **options) for s in (first[1], solver))
-            worst = max(worst, float(np.abs(a - b).max()) / _size(x))
+            worst = max(worst, float(np.abs(a - b).max()) / size_of(x))
         name = f"agreement of {target} with {first[0]}"
         yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
@@ -515,7 +516,3 @@ def _poisson(expansion: Expansion, x: Floats, parameters: Mapping[str, Any]) -> 
     for (a, b), value in zip(entries, evaluate(list(entries.values()), values), strict=True):
         matrix[index[a], index[b]] = float(value)
     return matrix
-
-
-def _size(x: Floats) -> float:
-    return float(np.abs(x).max()) or 1.0

@@ -177,8 +177,8 @@ def _sweep_of(
     sweep = replace(sweep, **changes)
     if end := end_of_its_own(sweep, run, monitored=spec.monitor is not None):
         raise ValueError(f"{end}; give the run steps instead")
-    if reason := average_obstacle(sweep, run, monitored=spec.monitor is not None):
-        raise ValueError(f"{reason}; choose a run with a stride, and without after")
+    if obstacle := average_obstacle(sweep, run, monitored=spec.monitor is not None):
+        raise ValueError("; ".join(obstacle))
     strange = [what for what in sweep.keep if what not in KEPT and Statistic.read(what, spec.recorded) is None]
     if strange:
         known = ", ".join([*KEPT, *spec.recorded, *(f"{of}({n})" for n in spec.recorded for of in STATISTICS)])

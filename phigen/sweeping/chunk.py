@@ -171,8 +171,9 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
         values = section(states, {**some.parameters, time: some.t0 + steps * some.h} if time else some.parameters)
         for sign in signs:
             along = sign * np.sign(some.h) * values
-            counts[part] += ((along[:-1] < 0) & (along[1:] >= 0)).sum(axis=0)
-            counts[part] += (along[:1] == 0).any(axis=0) & (along[1:2] > 0).any(axis=0)  # a start on the section
+            rises = (along[:-1] < 0) & (along[1:] >= 0)
+            rises[:1] |= (along[:1] == 0) & (along[1:2] > 0)  # a start on the section
+            counts[part] += rises.sum(axis=0)
     return counts
 
 

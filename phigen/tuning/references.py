@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from phigen.errors import CheckError
+from phigen.study.methods import size_of
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod
 from phigen.tuning.trials import MARKS
@@ -72,7 +73,7 @@ def agreed(
     (states, h, _), (second_states, _, _) = orbits
     difference = distance(states, second_states)
     if difference > AGREED * accuracy:
-        size = float(np.max(np.abs(second_states))) or 1.0
+        size = size_of(second_states)
         apart = np.max(np.abs(states - second_states), axis=1) > AGREED * accuracy * size
         raise CheckError(
             f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
@@ -101,7 +102,7 @@ def orbit_error(
 
 def distance(states: Floats, reference_states: Floats) -> float:
     """Return the largest difference between two runs (rows, DIM), relative to the largest coordinate of the second."""
-    return float(np.max(np.abs(states - reference_states))) / (float(np.max(np.abs(reference_states))) or 1.0)
+    return float(np.max(np.abs(states - reference_states))) / size_of(reference_states)
 
 
 def _converged(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from phigen.runtime.backend import Backend
+from phigen.study.methods import size_of
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
@@ -60,7 +61,7 @@ def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
 
     In high dimensions it is an estimate.
     """
-    size = float(np.max(np.abs(states))) or 1.0
+    size = size_of(states)
     width, rate = 1e-6 * size, 0.0
     for x in states:
         if len(x) > DENSE:

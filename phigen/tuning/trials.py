@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from phigen.study.methods import size_of
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import ROUNDING, Candidate, CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
@@ -108,7 +109,7 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         if states is None:
             return None
         expected = reference(stride * h, count)
-        size = float(np.max(np.abs(expected))) or 1.0
+        size = size_of(expected)
         errors = np.max(np.abs(states - expected), axis=1) / size
         rounding_unit = _rounding_unit(problem, method)
         largest = max(float(np.max(errors)), rounding_unit)
