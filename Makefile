@@ -1,9 +1,9 @@
 # Two commands to start with:
 #
 #   make demo    compile a system, integrate it, print what was conserved
-#   make test    everything that must hold before a change is merged; `make test-all` adds the long tests
+#   make test    run the checks that a change must pass; `make test-all` adds the long tests
 #
-# They make their own environment in .venv, once. PYTHON=python3.12 chooses the interpreter.
+# The first call installs phigen and its tools in .venv. PYTHON=python3.12 chooses the interpreter.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -16,7 +16,7 @@ STAMP := $(VENV)/.phigen-installed
 SITE := $(VENV)/.phigen-docs
 WORKERS ?= auto
 
-# Tests start Python some hundred times; compiled modules halve what that takes.
+# Tests start Python some hundred times. Compiled modules halve the time of these starts.
 test test-all: export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help demo test test-all lint rules format golden figures docs bench clean
@@ -30,7 +30,7 @@ demo: $(RUNS)
 test: rules
 	$(call tested,)
 
-# With the long tests, and the C of the corpus compiled with the flags users get.
+# `make test`, with the long tests, and with C that is compiled with the flags that users get.
 test-all: rules
 	$(call tested,--all)
 
@@ -41,8 +41,7 @@ rules: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-# Types are checked beside the tests: that is work for one core, and without its cache half a minute. What is said of
-# them comes last.
+# mypy runs while the tests run. It uses one core, for half a minute if it has no cache. Its output is printed last.
 define tested
 @$(BIN)/mypy >$(VENV)/.types 2>&1 & types=$$!; failed=0; \
 $(BIN)/python -m pytest -n $(WORKERS) $(1) || failed=$$?; \
@@ -53,29 +52,30 @@ format: $(STAMP)
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
 
-# Whole solvers in generated/, of the other systems what these do not have: read the diff before you commit it.
+# Write the golden files: whole solvers in generated/, and for other systems the paragraphs that no whole solver has.
+# Read the diff before you commit it.
 golden: $(STAMP)
 	$(BIN)/python tests/golden.py
 
-# The figures and numbers of the README, docs/gallery.md and docs/paper.md. About two minutes.
+# Make the figures and numbers of README.md, docs/gallery.md and docs/paper.md. Takes about two minutes.
 figures: $(STAMP)
 	$(BIN)/python docs/make_gallery.py
 	$(BIN)/python docs/make_paper.py
 	$(BIN)/python docs/make_overview.py
 
-# The site of the documentation, in build/site.
+# Make the web site of the documentation in build/site.
 docs: export NO_MKDOCS_2_WARNING := 1
 docs: $(SITE)
 	$(BIN)/mkdocs build --quiet
 
-# Beside the methods that people would otherwise use; see docs/benchmarks.md. About ten minutes on a quiet machine.
+# Compare phigen with other methods; see docs/benchmarks.md. Takes about ten minutes on a quiet machine.
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks
 
 clean:
 	rm -rf $(VENV) build dist
 
-# Installed anew when the dependencies change; an environment that is already there is kept.
+# Install again if the dependencies changed. An existing environment is not replaced.
 $(RUNS): pyproject.toml
 	@if ! [ -x $(BIN)/python ]; then \
 	  for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
@@ -97,12 +97,12 @@ $(RUNS): pyproject.toml
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[plot]'
 	@touch $@
 
-# What tests need beside it.
+# The packages for tests.
 $(STAMP): $(RUNS)
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[dev,plot]'
 	@touch $@
 
-# And what makes the site of the documentation.
+# The packages for the web site.
 $(SITE): $(RUNS)
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[docs]'
 	@touch $@

@@ -32,6 +32,7 @@ def hat(v):
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", ["c", "small", "numpy"])
 @pytest.mark.parametrize("sign", ["minus", "plus"])
 def test_momentum_in_the_other_frame_is_constant_for_large_steps(sign, target):

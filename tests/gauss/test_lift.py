@@ -71,6 +71,7 @@ def test_products_of_a_stage_are_few(name, most):
     assert operation_counts(CASES[name][0]().program.step.lifted.slope.roots)["multiplications"] <= most
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", CASES)
 def test_steps_are_those_of_the_frame_at_1(name):
     """Steps agree with those of solvers with tangent maps. These solvers use no frames, and their tangent maps show

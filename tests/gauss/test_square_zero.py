@@ -74,6 +74,7 @@ def test_bodies_in_several_fields_have_the_unknowns_of_one():
     assert compilation.program.step.unknowns == 8
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", CASES)
 def test_momenta_follow_the_equations_at_any_unknowns(name):
     """The vector field of the unknowns makes the momenta x obey ẋ = π∇H at any values of the unknowns; sympy compares

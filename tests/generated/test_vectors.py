@@ -38,7 +38,7 @@ COMPOSITIONS = {"flows back": "blanes-moan"}
 CLANG = [("clang", case) for case in ("explicit", "flows", "flows back", "sites back", "pairs")]
 
 
-@pytest.mark.thin(3)
+@pytest.mark.thin(5, of_all=2)
 @pytest.mark.parametrize(("compiler", "case"), [*(("gcc", case) for case in CASES), *CLANG])
 def test_loops_over_lanes_become_vectors(compiler, case, tmp_path):
     name, asked, functions = CASES[case]

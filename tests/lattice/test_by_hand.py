@@ -40,6 +40,7 @@ def test_sweeps_by_hand_in_pieces_have_the_bits_of_steps(name: str) -> None:
     assert whole.tobytes() == by_hand(name, x, 0.03, 3, seed=2).tobytes()
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", [*NAMES, "charges", "magnet"])
 def test_bits_do_not_depend_on_the_frames(name: str) -> None:
     """The steps are so large that some need full-range functions."""

@@ -144,6 +144,7 @@ int main(void)
 """
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", SPECS)
 def test_c_goes_on_as_a_solver_that_starts_with_the_new_parameters(name: str, tmp_path: Path) -> None:
     program, sites = compilation(name).program, SPECS[name][1]

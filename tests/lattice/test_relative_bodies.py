@@ -197,7 +197,7 @@ def written_out(count: int, change: str, composition: str, order: int) -> str:
     )
 
 
-@pytest.mark.thin(2, of_all=1)
+@pytest.mark.thin(4, of_all=1)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(("composition", "order"), [("wisdom-holman-17", 2), ("aba-8-6-4", 4), ("wisdom-holman", 2)])
 def test_a_lattice_is_its_ordinary_spec(change: str, composition: str, order: int) -> None:
@@ -338,6 +338,7 @@ def test_solvers_refuse_masses_without_a_finite_sum(change: str, tmp_path: Path)
 RUN = "runs: {one: {initial: {x: [POSITIONS], y: 0, vx: 0, vy: [SPEEDS]}, step: 0.1, steps: 40}}\n"
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("masses", ["0.3", "0, 0, 1.0e-3", "0, 1.0e-3, 0, 2.0e-4, 0, 0, 0, 0"])
 def test_bodies_are_verified_on_a_few_of_them_with_the_first(masses: str) -> None:
     count = 1 + len(masses.split(","))
@@ -372,6 +373,7 @@ def test_masses_of_runs_are_refused_at_their_place(masses: str, momenta: bool, m
     assert caught.value.diagnostics[0].location.line == 5
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_collision_is_an_error_and_a_hyperbola_is_not(change: str, target: str) -> None:

@@ -108,7 +108,7 @@ def test_states_do_not_depend_on_the_outputs(profile):
         np.testing.assert_allclose(ends, ends[:1] * 3, rtol=0, atol=1e-13)
 
 
-@pytest.mark.thin(1)
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, "modified-"), (None, "")])
 def test_gradients_of_runs_are_differences(target, stride, kernel):

@@ -77,7 +77,7 @@ def with_derivatives(name, composition):
     return compile_spec(chosen, order=4, tangent=True, adjoint=True).program
 
 
-@pytest.mark.thin(3)
+@pytest.mark.thin(6)
 @pytest.mark.parametrize(
     ("name", "composition"),
     [

@@ -139,7 +139,7 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     run([tool("gcc"), *STRICT, "-fsyntax-only", "-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, RUNTIME / name], tmp_path)
 
 
-@pytest.mark.thin(2, of_all=1)
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize(
     "path",
     [p for p in sorted(RUNTIME.glob("*.c")) if not p.name.startswith(OF_LATTICES + OF_MODELS + OF_DEVICES)],
