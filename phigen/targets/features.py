@@ -11,10 +11,10 @@ from phigen.scheme.step_kinds import STEP_KINDS, StepKind
 
 @dataclass(frozen=True)
 class Feature:
-    """Switch that says whether a solver has some parts of the runtime.
+    """Switch that turns parts of the runtime on or off.
 
     It is on if three conditions hold: ``when`` is true for the program, all switches in ``requires`` are on, and the
-    user has not excluded the part of the code named ``part``.
+    user has not excluded ``part`` from the generated code.
     """
 
     name: str

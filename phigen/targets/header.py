@@ -73,9 +73,9 @@ def facts(
 ) -> dict[str, object]:
     """Return the constants that describe a system in a module, as template values.
 
-    ``listed`` prints a sequence, and ``key`` the name of a parameter. Some parameters of lattices have an array as the
-    default. The array belongs to one size of the lattice, but the module serves all sizes. So ``nothing`` is printed in
-    place of such an array.
+    ``listed`` prints a sequence, and ``key`` the name of a parameter. The default of a lattice parameter may be an
+    array, which belongs to one size of the lattice. The module serves all sizes, so it contains ``nothing`` in place of
+    the array.
     """
     noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {
@@ -106,7 +106,7 @@ def facts(
 def sealed(lines: Sequence[str], body: str, mark: str = " * ", begin: str = "/*\n", end: str = " */\n") -> str:
     """Return the text of a file: a comment with ``lines`` and the checksum of the body, then the body.
 
-    Comment marks are those of C by default.
+    By default, the comment is a comment of C.
     """
     text = "\n".join(f"{mark}{line}".rstrip() for line in [*lines, f"{CHECKSUM} {checksum(body)}"])
     return f"{begin}{text}\n{end}{body}"
@@ -118,8 +118,8 @@ def checksum(body: str) -> str:
 
 
 def split(text: str) -> tuple[str | None, str]:
-    """Return the checksum in the header of a generated file, and the body after the header; None if there is no
-    checksum.
+    """Return the checksum in the header of a generated file, or None if there is no checksum, and the body after the
+    header.
     """
     match = re.search(rf"{CHECKSUM} ([0-9a-f]{{64}})[^\n]*\n(?: \*/\n)?", text)
     return (match.group(1), text[match.end() :]) if match else (None, text)

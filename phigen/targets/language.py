@@ -1,4 +1,4 @@
-"""Description of a target language, as far as it concerns the printing of formulas."""
+"""Description of a target language: the way in which it writes formulas."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from phigen.targets.reserved import Reserved
 class Language:
     """Spelling of formulas in a language.
 
-    ``functions`` maps elementary functions to their names, or to texts with ``{0}`` for the argument. They include
-    functions that the generated file defines. ``whole`` and ``real`` print integers and all other numbers.
+    ``functions`` maps elementary functions to their names, or to texts with ``{0}`` for the argument. If the language
+    lacks a function, the generated file defines it. ``whole`` prints integers, and ``real`` prints all other numbers.
     """
 
     reserved: Reserved

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: Powers of two with a smaller exponent than this one are printed as powers. They are bounds on rounding errors.
+#: A power of two is printed as a power if its exponent is smaller than this. Such numbers are bounds on rounding
+#: errors.
 _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """Return the policies of a program by the names of the runtime files that contain its constants.
+    """Return the policies of a program. The key of a policy is the name of the runtime file that contains its
+    constants.
 
     If coordinates keep their signs during a step, errors are measured relative to each coordinate.
     """

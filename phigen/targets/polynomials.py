@@ -1,4 +1,4 @@
-"""Polynomials in one variable as C. They are arranged such that few operations have to wait for one another."""
+"""Polynomials in one variable as C, arranged so that few operations wait for the result of another operation."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ _BLOCK = 4
 
 
 def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
-    """Return Σ c_k variable^k as text in C: statements, and the expression of the value, which uses their
+    """Return C for the value of Σ c_k variable^k: statements that define variables, and an expression in these
     variables.
 
-    Estrin's scheme combines blocks of four coefficients. The values of the blocks are variables that are named by
-    letters, from ``first`` on.
+    Estrin's scheme combines blocks of four coefficients. The value of each block is a variable. The names of these
+    variables are successive letters, from ``first`` on.
     """
     v = variable
     blocks = [coefficients[i : i + _BLOCK] for i in range(0, len(coefficients), _BLOCK)]

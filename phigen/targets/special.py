@@ -23,8 +23,8 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
 
-#: Largest number of halvings of t when exponentials of small matrices are computed. Arguments that need more would
-#: overflow.
+#: Largest number of halvings of t when exponentials of small matrices are computed. If more halvings were needed, the
+#: exponential would overflow.
 MOST_HALVINGS = 14
 
 #: Number of iterations after which the arithmetic–geometric mean of any two doubles has converged.
@@ -53,7 +53,9 @@ def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
 
 
 def values(function: str, name: str) -> Mapping[str, object]:
-    """Return the values for the template of φ or of a derivative of φ, which is called ``name`` in the output."""
+    """Return the values for the template of φ or of a derivative of φ; ``name`` is the name of the function in the
+    output.
+    """
     order = order_of(function)
     near, rest = near_coefficients(order), rest_coefficients(order)
     return {
@@ -73,9 +75,10 @@ def values(function: str, name: str) -> Mapping[str, object]:
 
 
 def closed(order: int) -> tuple[str, ...]:
-    """Return the statements for a derivative of φ in closed form, preceded by those for the values that they read.
+    """Return statements that compute a derivative of φ in closed form, after statements for φ and for the lower
+    derivatives.
 
-    They are valid in C and in Python, and use c = w cot w.
+    The statements are valid in C and in Python, and use c = w cot w.
     """
     return _CLOSED[: order + 1]
 
@@ -83,8 +86,8 @@ def closed(order: int) -> tuple[str, ...]:
 def turns(*, single: bool) -> dict[str, object]:
     """Return constants for subtracting multiples of π from w = √s/2: 1/π, and an upper and a lower part of π.
 
-    The sum of the parts is π. The upper part has 33 bits, or 8 in single precision, so that its products with integers
-    up to 2^20, or 2^16, are exact. ``limit`` is the value of s up to which no larger integer is needed.
+    The sum of the two parts is π. The upper part has 33 bits, so its products with integers up to 2^20 are exact. In
+    single precision it has 8 bits, for integers up to 2^16. For s up to ``limit``, no larger integer is needed.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)
     upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
@@ -98,7 +101,7 @@ _BEYOND_PI = 1.2246467991473532e-16
 
 
 class _Calls:
-    """Stand-in for a math library. Its functions return expressions that call them."""
+    """Stand-in for a math library: each of its functions returns an expression, the call of the function."""
 
     def __getattr__(self, name: str) -> Callable[..., Expression]:
         return lambda *arguments: call(name, *arguments)
@@ -179,9 +182,9 @@ def _described(place: int) -> str:
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of elliptic functions, by Carlson's integrals. Each entry has the comment, the template of Carlson's
-#: integral, the arguments of Carlson's integral for the integral up to t, and its arguments for the integral over half
-#: a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P;
+#: Integrals of elliptic functions, computed by Carlson's integrals. Each entry has four texts: the comment, the
+#: template of Carlson's integral, the arguments of Carlson's integral for an integral up to t, and the arguments for an
+#: integral over half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P;
 #: `phigen.symbolic.elliptic` defines S, P and R.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
@@ -254,8 +257,8 @@ def anomaly_values(*, single: bool = False) -> dict[str, object]:
     """Return the values that the templates of the universal anomaly have in all languages; ``single`` is for 32-bit
     numbers.
 
-    ``unit`` is the relative error of a rounding. The iteration ends at the error ``rounding``, which is a tenth of
-    ``unit``.
+    ``unit`` is the relative error of a rounding. The iteration ends when the relative error is below ``rounding``,
+    about a tenth of ``unit``.
     """
     if single:
         return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}

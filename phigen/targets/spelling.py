@@ -27,8 +27,8 @@ class Dialect:
     """Spelling of values of the loop IR in a language.
 
     ``operators`` and ``functions`` map names in the IR to names in the language, if these differ. ``select`` is the
-    format of a conditional value: condition, and the values if it is true and false. ``subscript`` prints an element of
-    an array, whose indices count from 0, and ``member`` a member of a record.
+    format of a conditional value: {0} is the condition, {1} the value if it is true, and {2} the value if it is false.
+    ``subscript`` prints an element of an array, and ``member`` a member of a record. Indices count from 0.
     """
 
     language: Language

@@ -15,12 +15,12 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Members of the struct of a solver that belong together. Solvers have them if the condition ``when`` holds for
-    their switches; "" holds for all solvers.
+    """Members of the struct of a solver that belong together. A solver has them if the condition ``when`` holds for its
+    switches. The condition "" always holds.
 
-    ``members`` are declarations in C, with comments for users. ``saved`` has the members that are restored if a step
-    fails, each with its length, which is "" for numbers. ``reset`` are statements for a new step size. ``copied`` are
-    the statements of JavaScript that copy the fields to another solver.
+    ``members`` are declarations in C, with comments for users. ``saved`` are the members that are restored if a step
+    fails. They are pairs: the name, and the length of an array or "" for a number. ``reset`` are statements for a new
+    step size. ``copied`` are the statements of JavaScript that copy the fields to another solver.
     """
 
     name: str

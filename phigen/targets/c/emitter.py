@@ -35,10 +35,10 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Cost model of steps that are solved together in a block. While a solver evaluates one step alone, a block makes
-#: PASSES iterations for each of its steps. If the loop over the block calls library functions, which are not
-#: vectorised, it makes PASSES_OF_CALLS; the same number holds for steps along paths, since a step alone computes no
-#: derivatives of its path.
+#: Cost model of blocks, in which several steps are solved together. In the time in which a solver evaluates one step
+#: alone, a block makes PASSES iterations for each of its steps. Blocks that call library functions are not vectorised,
+#: and make PASSES_OF_CALLS iterations. Blocks of steps along paths have the same number, since they also compute
+#: derivatives of paths, which a step alone does not need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
@@ -222,10 +222,9 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
 
 
 def _stack(bound: StackBound, name: str) -> Sizes:
-    """Return the number of bytes of stack that the solver needs, as constants with comments.
+    """Return the numbers of bytes of stack that the solver needs, as constants with comments.
 
-    The number depends on the function that is called first. There is a constant for each of several functions, and one
-    for any function; the comment names the function.
+    The functions `NAME_init` and `NAME_step` have a constant each. Another constant holds for all functions.
     """
     return [
         ("STACK_OF_INIT", bound.init, f"from {name}_init on"),
@@ -240,9 +239,7 @@ Exported = list[tuple[Kernel, str, bool]]
 
 
 def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
-    """Yield the public functions that are evaluated at a state, in groups, each group with its comment for the
-    header.
-    """
+    """Yield the public functions that are evaluated at a state, in groups. Each group has a comment for the header."""
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
     yield (

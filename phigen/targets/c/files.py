@@ -14,7 +14,8 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: The condition of each file, a condition on switches (`phigen.targets.c.features`).
+#: The files with their conditions on switches (`phigen.targets.c.features`). A solver has a file if its condition
+#: holds.
 CONDITIONS = {
     **{f"{kind}.c": kind.upper() for kind in _KINDS},
     **{f"tangent_{kind}.c": f"TANGENT && {kind.upper()}" for kind in _KINDS},
@@ -225,7 +226,7 @@ CONDITIONS = {
     "tangent_product.c": "TANGENT",
 }
 
-#: Hooks: functions that are called as statements of their own. Each has the condition under which its calls remain.
+#: Hooks: functions whose calls are whole statements. Each has the condition under which its calls remain.
 CALLS = {
     "phi_add_aside": "RATE_OF_GAUGE",
     "phi_add_by_parameters": "PARAMETERS || MONITOR",

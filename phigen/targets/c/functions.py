@@ -44,7 +44,7 @@ FLOW_FUNCTIONS = tuple(
 )
 
 
-#: Terms of a series are omitted in single precision if they are smaller than this, relative to the first term: a
+#: In single precision, terms of a series are omitted if they are smaller than the first term times this number. It is a
 #: quarter of a rounding error.
 _SINGLE_NEGLIGIBLE = 2.0**-26
 
@@ -53,12 +53,12 @@ C = TypeVar("C", float, Fraction)
 
 @dataclass(frozen=True)
 class Small:
-    """An elementary function with a series for small arguments t: Σ_k s_k z^k/(first + k·step)!.
+    """Elementary function with a series for small arguments t: Σ_k s_k z^k/(first + k·step)!.
 
-    The factors s_k are the two ``signs`` in turn, and z is t², or t if ``step`` is 1. ``far`` is the formula for all
-    arguments. ``flows`` describes the version for flows: the largest |t|, the number of terms, and the function as
-    text, in which P stands for the sum. ``rows`` describes the version for loops over sites, which has the fewest
-    operations.
+    The factors s_k alternate between the two ``signs``. If ``step`` is 2, z is t²; if ``step`` is 1, z is t. ``far`` is
+    a formula for all arguments. ``flows`` describes the version that flows call: the largest |t|, the number of terms,
+    and a formula in which P is the sum. ``rows`` describes the version for loops over sites in the same way. This
+    version has the fewest operations.
     """
 
     meaning: str
@@ -87,10 +87,11 @@ _SMALL = {
 
 
 def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool = False) -> list[str]:
-    """Return the definitions of special functions that the kernels of a program call, except the kernels ``unprinted``.
+    """Return the definitions of special functions that the kernels of a program call, except the kernels
+    ``unprinted``.
 
-    Special functions are φ and its derivatives, the functions of `ENTIRE`, and for a splitting those that its flows
-    call. On a ``device``, φ is computed without a tangent.
+    Special functions are φ, its derivatives, and the functions of `ENTIRE`. For a splitting, they include the functions
+    that its flows call. On a ``device``, φ is computed without a tangent.
     """
     # Loops over the sites of a lattice call other versions of these functions, so only the flows of systems without a
     # lattice count here.
@@ -151,8 +152,8 @@ def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str
 
 
 def _anomaly(program: Program, *, near: bool = False) -> str:
-    """Return the definition of the universal anomaly of Kepler motions. It contains series for c2 and c3, which have
-    the same powers.
+    """Return the definition of the universal anomaly of Kepler motions. It contains two series with the same powers,
+    for the Stumpff functions c2 and c3.
     """
     c2, c3 = special.stumpff()
     count = max(len(needed(program, c, 1.0)) for c in (c2, c3))
@@ -230,8 +231,8 @@ def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """Return the first coefficients of a series. They are as many as are needed for full precision at arguments up to
-    ``reach``.
+    """Return the coefficients of a series without those that the precision of a program does not need. Arguments are at
+    most ``reach``.
     """
     if not program.single:
         return list(coefficients)

@@ -14,15 +14,15 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: Threshold for the end of sweeps in single precision. Like all thresholds, it is given for double precision, and
-#: `phigen.targets.c.real.threshold` converts it: 1.3e-20 becomes 1e-9. Relative to a rounding error, 1e-9 in single
-#: precision is as small as 2e-18, the threshold for double precision. The conversion of 2e-18 itself gives a larger
-#: number. With this number, the energy error of 1e5 steps of Hénon–Heiles would be 2e-5 instead of 5e-7.
+#: Threshold for the end of sweeps in single precision. The number is written as for double precision, and
+#: `phigen.targets.c.real.threshold` converts it to 1e-9. In multiples of a rounding error, 1e-9 equals the threshold
+#: 2e-18 of double precision. The conversion of 2e-18 itself would give a larger threshold; the energy error of 1e5
+#: steps of Hénon–Heiles would then be 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
-#: Threshold for the end of sweeps of methods whose stages are in a loop, not in lanes. With 2e-18, the relative energy
-#: of the Hénon–Heiles system drifts by 1.7e-18 per step in 3e5 steps of size 0.7 at order 12. With this threshold it
-#: drifts by less than 2e-19 per step, and steps take 5 % longer.
+#: Threshold for the end of sweeps if the stages of a method are in a loop, not in lanes. It was chosen for the
+#: Hénon–Heiles system at order 12, by 3e5 steps of size 0.7. With the usual threshold 2e-18, the relative energy drifts
+#: by 1.7e-18 per step. With 5e-19, it drifts by less than 2e-19 per step, and steps take 5 % longer.
 LOOP_SOLVED = 5e-19
 
 
@@ -45,7 +45,9 @@ def _width(step: Gauss, lanes: Lanes | None) -> int:
 
 
 def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
-    """Return the sizes of a Gauss method that are declared with the struct of the solver: name, value and comment."""
+    """Return sizes of a Gauss method: name, value and comment. They are declared together with the struct of the
+    solver.
+    """
     width = _width(step, lanes)
     return [
         ("NODES", step.tableau.stages, "stages of a step"),
@@ -133,11 +135,12 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
 
 
 def with_frames(program: Program) -> Program:
-    """Return the program with the step of `Gauss.lifted`, if the solver can use it; else return the program unchanged.
+    """Return the program with the step of `Gauss.lifted`, if the solver can use it; else return the program
+    unchanged.
 
-    This step has frames of group elements that change from step to step. It is used if single trajectories have their
-    stages in SIMD lanes. It is not used if ensembles are integrated in batches, since a batch has no frames, and its
-    steps must equal those of single trajectories.
+    This step has frames of group elements that change from step to step. It is used in double precision, if single
+    trajectories have their stages in SIMD lanes and ensembles are not integrated in batches. A batch has no frames, and
+    its steps must equal those of single trajectories.
     """
     step = program.step.lifted
     lanes = in_lanes(program) if step else None

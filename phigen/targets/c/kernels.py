@@ -73,11 +73,13 @@ def function(
     array.
 
     With ``lanes``, the kernel is evaluated at several points: each value becomes an array over the lanes, except for
-    the inputs in ``shared``. For the inputs in ``alike``, all lanes read the first lane if the argument
-    ``distinct_coef`` is 0; such a kernel is inlined where the value of this argument is known. A ``single`` kernel is
-    evaluated in one lane, the argument ``lane``, and its outputs are numbers. A ``sparse`` kernel does not store
-    outputs that are always zero. ``versions`` maps elementary functions to the functions that are called
-    (`phigen.ir.passes.forms`).
+    the inputs in ``shared``. The inputs in ``alike`` may be equal in all lanes: if the argument ``distinct_coef`` is 0,
+    all lanes read the first lane. A kernel with inputs of this kind is inlined where the value of the argument is
+    known.
+
+    With ``single``, the kernel is evaluated in one lane, whose number is the argument ``lane``, and its outputs are
+    numbers. With ``sparse``, outputs that are always zero are not stored. ``versions`` maps elementary functions to the
+    functions that are called in their place (`phigen.ir.passes.forms`).
     """
     if kernel.exponents:
         return _through_exponentials(program, kernel)
@@ -180,13 +182,14 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
-    # Inside a solver, inputs and outputs never overlap, so that restrict is correct. For exported functions they may
-    # overlap.
+    # Inside a solver, inputs and outputs never overlap, so that restrict is correct. Callers of exported functions may
+    # pass arrays that overlap.
     qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
     arguments += ["int distinct_coef"] if form.alike else []
     for o in () if form.returning else kernel.outputs:
-        # The caller of NAME_casimirs has an array of NAME_CASIMIRS numbers, which may be 0, so the length is left out.
+        # A solver may have no Casimirs. The array of NAME_casimirs would then have the length 0, so its length is left
+        # out.
         length = "" if form.exported and kernel.role is Role.CASIMIRS else f"{qualifier}{max(1, len(o.values))}"
         arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
     if form.workspace:

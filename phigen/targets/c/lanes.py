@@ -18,23 +18,23 @@ from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
 from phigen.targets.c.kernels import function
 
-#: Predictors fit linear recurrences to past solutions. WINDOW is the number of past values in a recurrence, a multiple
-#: of 8. FITTED is the number of values to which it is fitted. For large systems this would need too much memory; then
-#: the number is smaller, but at least SMALLEST.
+#: Predictors fit linear recurrences to past solutions. WINDOW is the number of past values from which a recurrence
+#: computes the next value, a multiple of 8. FITTED is the number of values to which the recurrence is fitted. For large
+#: systems, 112 values would need too much memory; the number is then smaller, but at least SMALLEST.
 WINDOW, FITTED, SMALLEST = 40, 112, 32
 
 #: Largest number of past values that a solver stores for its recurrences: 64 kB in double precision.
 MOST_HISTORY = 8_000
 
-#: Number of past values on which a recurrence is tested. They are not among the values that it is fitted to.
+#: Number of past values on which a recurrence is tested. The recurrence is not fitted to these values.
 CHECKS = 8
 
 
 def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     """Return the sizes of the recurrences of a solver as constants by name.
 
-    They are the number of stored past values, the number of past values in a recurrence, the number of values that a
-    recurrence predicts, and the number of past values on which it is tested.
+    The sizes are four numbers of values: those that are stored, those from which a recurrence computes the next value,
+    those that a recurrence predicts, and those on which a recurrence is tested.
     """
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     values = max(SMALLEST, min(FITTED, affordable))
@@ -45,8 +45,8 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: The increment of a stage is predicted from derivatives at the starts of this number of steps: the next step, the
-#: present one, and earlier ones.
+#: Number of derivatives from which the increment of a stage is predicted. They are the derivatives at the starts of the
+#: next step, of the present step, and of earlier steps.
 KNOTS = 4
 
 
@@ -66,7 +66,7 @@ def travels(fractions: Sequence[float]) -> list[list[float]]:
 
 
 def grouped(program: Program, lanes: Lanes | None) -> bool:
-    """Whether ensembles are integrated in SIMD batches; the history of a batch must fit on the stack."""
+    """Whether ensembles are integrated in SIMD batches. This requires that the history of a batch fits on the stack."""
     memory = remembered(program, lanes)
     values = len(program.fractions) * (memory["REMEMBERED"] + memory["WINDOW"]) * program.dimension
     return isinstance(lanes, Blocks) and lanes.grouped(values)

@@ -51,8 +51,9 @@ def _extended(name: str, pattern: str) -> Reserved:
 def elementary_functions(name: str) -> dict[str, str]:
     """Return the names that elementary functions have in the code of a solver.
 
-    Functions that the C library lacks belong to the solver, and have its name as prefix. So do versions for small
-    arguments and for SIMD lanes (`phigen.ir.passes.forms`), unless they are formulas in other functions.
+    A solver defines the functions that the C library lacks. The names of these functions begin with the name of the
+    solver. The same holds for versions for small arguments and for SIMD lanes (`phigen.ir.passes.forms`), but some
+    versions are not functions: they are formulas that call other functions.
     """
     lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
     formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}

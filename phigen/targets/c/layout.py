@@ -77,7 +77,7 @@ def _macro(lines: list[str]) -> Iterator[str]:
 
 
 def _statement(lines: list[str], first: int) -> int:
-    """Return the index of the line in which the last open parenthesis of a statement is closed."""
+    """Return the index of the line in which all parentheses of a statement are closed."""
     depth = 0
     for k in range(first, len(lines)):
         code = _STRING.sub("", lines[k]) if '"' in lines[k] else lines[k]

@@ -143,8 +143,8 @@ class _StatementPrinter:
     def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
         """Yield the lines of statements."""
         if self.shared_line:
-            # Values that are printed in place come first. Between other declarations, they would keep these
-            # declarations from sharing a line.
+            # Declarations of values that are printed in place come first, so that they do not separate other
+            # declarations, which share lines.
             body = sorted(body, key=lambda s: not (isinstance(s, ir.Declare) and s.in_place))
         for kind, group in groupby(body, self._kind):
             if kind == "discards":

@@ -1,8 +1,8 @@
 """Expansion of macros of the C runtime, so that generated files do not contain these macros.
 
-The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If a macro with
-an empty text stands alone on the line before a statement or a block, the statement or block loses its indentation: such
-a macro replaces the head of a loop that runs once.
+The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. The second
+difference concerns macros with an empty text that stand in place of the head of a loop which runs once. If a line
+begins with a macro of this kind, the macro is removed, and the body of the loop loses its indentation.
 """
 
 from __future__ import annotations

@@ -15,11 +15,10 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Choice:
-    """Macros whose texts depend on the same switches. ``phrases`` maps each macro to one text for each
-    condition.
+    """Macros whose texts depend on the same switches.
 
-    The text for the first of the ``conditions`` that holds is used; if none holds, the last text is used. ``about``
-    says in a comment what the macros are for.
+    For each macro, ``phrases`` has a text for each of the ``conditions``, and one more text. A solver gets the text for
+    the first condition that holds, or the last text if none holds. ``about`` says in a comment what the macros are for.
     """
 
     about: str

@@ -108,7 +108,9 @@ class Real:
         return replace(language, functions=functions, constants=constants, whole=self.number, real=self.number)
 
     def names(self) -> dict[str, str]:
-        """The names of library functions and limits that differ from those for double, by the names for double."""
+        """The names of library functions and limits in this type, by their names for double. Only names that differ are
+        included.
+        """
         functions = {f: self._function(f) for f in _FUNCTIONS}
         return {**functions, **self.words, **{f"-{word}": f"-{text}" for word, text in self.words.items()}}
 

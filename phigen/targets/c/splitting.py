@@ -101,8 +101,8 @@ def adjoint_in_lanes(
 ) -> list[str]:
     """Return the text of the transposes of the flows for batches of members in SIMD lanes.
 
-    They call the versions ``near`` of elementary functions, for small arguments. Flows that call functions with such
-    versions are printed a second time, with the versions ``far`` for all arguments.
+    The transposes call the versions ``near`` of elementary functions, some of which are correct for small arguments
+    only. A transpose that calls one of these is printed a second time, with the versions ``far`` for all arguments.
     """
     kernels, build = _transposed(program, step, back)
     texts = []

@@ -15,8 +15,8 @@ from phigen.targets.state import STATE, StateBlock, belongs
 
 @dataclass(frozen=True)
 class Part:
-    """A file that the runtime includes. It has the lines that ``lines`` returns for each of the ``blocks``,
-    indented.
+    """File that the runtime includes. For each of the ``blocks``, it has the lines that ``lines`` returns; ``indent``
+    is the indentation of these lines.
     """
 
     blocks: Sequence[StateBlock]

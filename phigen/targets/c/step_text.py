@@ -28,14 +28,14 @@ Switches = Mapping[str, bool]
 
 @dataclass(frozen=True)
 class StepText:
-    """The parts of a solver that depend on the kind of step. Each field is a function; it receives the step, and may
+    """The parts of a solver that depend on the kind of step. Each field is a function. It receives the step, and may
     also receive the program, the lanes and the switches.
 
-    ``texts`` returns files that the runtime includes, and ``declared`` the sizes that are declared with the struct of
-    the solver. ``constants`` and ``last_constants`` return other sizes, printed before and after those of SIMD lanes.
-    ``kernels`` returns the kernels that are printed first. ``tangents`` returns those printed after the kernels of the
-    gauge and the monitor, and ``transposes`` those printed after the tangents. ``trail`` returns the number of
-    values that a step stores on the tape. ``packed`` prints the kernels for SIMD batches of members.
+    ``texts`` returns files that the runtime includes. ``declared`` returns the sizes that are declared with the struct
+    of the solver. ``constants`` returns sizes that are printed before the sizes of SIMD lanes, and ``last_constants``
+    sizes that are printed after these. Kernels are printed in this order: ``kernels``, the kernels of the gauge and the
+    monitor, ``tangents``, ``transposes``. ``trail`` returns the number of values that a step stores on the tape.
+    ``packed`` prints the kernels for SIMD batches of members.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}

@@ -85,7 +85,7 @@ MEMBERS = (
     ),
 )
 
-#: Members of the struct for the reverse pass of a step: derivatives of a number L.
+#: Members of the struct for the reverse pass of a step: derivatives of L, the number whose gradient is computed.
 COTANGENT = (
     StateBlock(
         "x",
@@ -124,7 +124,8 @@ PULLED = (
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
 )
 
-#: Members of the struct for the reverse pass of a batch of members: derivatives of a number L, as in phi_cotangent.
+#: Members of the struct for the reverse pass of a batch of members: derivatives of L, the number whose gradient is
+#: computed.
 BACK_GROUP = (
     StateBlock(
         "x",
@@ -138,8 +139,8 @@ BACK_GROUP = (
     ),
 )
 
-#: Members of the struct for the reverse pass of a lattice: derivatives of a number L, and pointers to the arrays of the
-#: reverse pass.
+#: Members of the struct for the reverse pass of a lattice: derivatives of L, the number whose gradient is computed, and
+#: pointers to arrays.
 TRANSPOSE = (
     StateBlock(
         "bar",

@@ -48,7 +48,8 @@ def tokens(text: str) -> Iterator[CToken]:
         yield CToken(_KINDS[match.lastgroup or ""], match[0])
 
 
-#: Operators of several characters. ".." is not an operator, but `lexemes` reads "..." character by character.
+#: Operators of several characters. C has no operator "..", but `lexemes` appends one character at a time, and ".." is
+#: part of "...".
 _OPERATORS = {
     "<<=", ">>=", "...", "..", "->", "++", "--", "<<", ">>", "<=", ">=", "==", "!=", "&&", "||", "*=", "/=", "%=", "+=",
     "-=", "&=", "^=", "|=",

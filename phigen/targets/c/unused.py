@@ -48,7 +48,9 @@ def _declared(functions: Iterable[Function]) -> set[int]:
 
 
 def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
-    """Return the indices of the lines that declare types. Their members may have the names of functions."""
+    """Return the indices of the lines that declare types. On these lines, names of members may equal names of
+    functions.
+    """
     types = (d for d in declarations if lines[d.begin].startswith(_TYPES))
     return {k for d in types for k in range(d.begin, d.end)}
 

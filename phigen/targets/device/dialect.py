@@ -11,21 +11,22 @@ DEVICES_ONLY = "#if defined(__OPENCL_VERSION__) || defined(__CUDACC__) || define
 
 _TABLE = "static const "
 
-#: First words of declarations of types, which need no qualifier for an address space.
+#: First words of declarations that define a type. Types need no qualifier for an address space.
 _TYPES = ("typedef", "enum", "struct", "union")
 
 
-#: Texts with which functions declare coefficients as parameters.
+#: Ways in which functions declare their parameter for coefficients.
 _COEFFICIENTS = [f"const {real} {end}" for real in ("double", "float") for end in ("*coef,", "*coef)", "coef[")]
 
 
 def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[str]:
-    """Return the lines of a solver with qualifiers for devices, in the part of the file for devices.
+    """Return the lines of a solver with qualifiers for devices. Only the part of the file for devices is
+    changed.
 
-    Functions get the qualifier `NAME_FUNCTION`, which includes static, and tables get `NAME_CONSTANT`. Kernels have
-    their qualifiers in the runtime already. If coefficients may be ``common`` to all members, functions read them in
-    the address space `NAME_COEF`. Raises `ValueError` for variables that have no address space on devices: non-constant
-    variables outside functions, and static variables inside functions.
+    Functions get the qualifier `NAME_FUNCTION`, which contains the word static; tables get `NAME_CONSTANT`. Kernels are
+    not changed, since the runtime declares them with their qualifiers. If all members may have ``common`` coefficients,
+    parameters for coefficients get the address space `NAME_COEF`. Raises `ValueError` for a variable that has no
+    address space on devices: a variable outside functions that is not constant, or a static variable inside a function.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]

@@ -1,7 +1,7 @@
 """Emission of a program as `NAME_device.h`, a single source for OpenCL C, CUDA and HIP.
 
-The file has the code of the profile ``small`` in a dialect of C: a prelude of macros for the differences between the
-languages, the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, and a kernel for ensembles.
+The file has three parts: macros for the differences between the languages, the runtime of ``templates/c/runtime`` with
+the switch ``DEVICE``, and a kernel for ensembles. Its style is that of the profile ``small``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SUFFIX = "_device.h"
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the generated file by its name. ``command`` is the command that regenerates it, for the header."""
+    """Return the generated file by its name. Its header says that ``command`` regenerates it."""
     name = program.name
     lines = [*header_lines(program, command), *_READING]
     if slow := spilling(program):

@@ -44,7 +44,9 @@ _ARRAYS = {
 
 
 def body(program: Program, step: Sweeps, language: str) -> str:
-    """Return the text of the file without its header comment; ``language`` is the prelude of macros."""
+    """Return the text of the file without its header comment. ``language`` is the text of the macros for the
+    differences between OpenCL C, CUDA and HIP.
+    """
     loops = LatticeLoops(program, step)
     arrays = kernel_arrays(loops)
     numbers = [*loops.numbers, *([program.time] if program.time else [])]

@@ -6,28 +6,30 @@ from phigen.ir.launches import EnsembleLaunch
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 
-#: Bytes of shared memory that a work group has on all graphics cards, and bytes of a number.
+#: Number of bytes of shared memory that a work group can have on every graphics card, and number of bytes of a double.
 _SHARED, _NUMBER = 48 * 1024, 8
 
-#: Sizes of work groups to try, the largest first. If work items use many registers, 128 hides the latency of memory
-#: better than 256.
+#: Sizes of work groups to try, the largest first. Larger groups are not tried: if work items use many registers, 128
+#: work items hide the latency of memory better than 256.
 _GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
 
 
 def predictors(program: Program) -> int:
-    """Return the number of values that the predictors of a member store. They are stored in shared memory."""
+    """Return the number of values that the predictors of one member store. The values are in shared memory."""
     if not program.step.kind.predicted or program.step.kind.collocates or program.noise:
         return 0
     return PredictorPolicy().differences * program.dimension * len(program.fractions)
 
 
 def group_size(program: Program) -> int:
-    """Return the largest number of work items in a group whose predictors fit into shared memory."""
+    """Return the size of a work group: the largest size for which the predictors of all its work items fit into shared
+    memory.
+    """
     of_item = _NUMBER * predictors(program)
     return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
 
 
-#: Largest size in bytes of the coefficients that a kernel receives as an argument: in CUDA, all arguments together may
+#: Largest size in bytes of coefficients that are passed as an argument of a kernel. In CUDA, all arguments together may
 #: have 4,096 bytes.
 _COMMON_BYTES = 3_840
 

@@ -12,10 +12,10 @@ from phigen.scheme.program import Program
 
 @dataclass(frozen=True)
 class Spills:
-    """Measurement of code that the CUDA compiler made for the steps of a system by the series.
+    """Measurement for one system: the CUDA compiler compiled its steps by the series for the architecture
+    sm_90.
 
-    For each member, ``size`` bytes are in memory, because they do not fit into the registers of a card with the
-    architecture sm_90.
+    ``size`` is the number of bytes of one member that are in memory, because they do not fit into registers.
     """
 
     name: str
@@ -29,9 +29,9 @@ class Spills:
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Measurements. A step with at least as many coordinates and coefficients as a measured system spills about as many
-#: bytes from registers to memory as that system, or more. Steps with fewer than 6 coordinates and at most 40
-#: coefficients do not spill. This was measured for 52 builds of 19 systems of the corpus, with orders 2 to 6.
+#: Measurements. If a step has at least as many coordinates and coefficients as a measured system, it spills at least
+#: about as many bytes as that system from registers to memory. Steps with fewer than 6 coordinates and at most 40
+#: coefficients do not spill. These rules hold for 52 builds of 19 systems of the corpus, with orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),

@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Modules for ordinary systems in order, each with its condition on switches.
+#: Modules for ordinary systems, in the order in which they are printed, each with its condition on switches.
 MODULES = {
     "errors": "",
     "march": "",
@@ -99,7 +99,7 @@ MODULES = {
     "linear": "IMPLICIT",
 }
 
-#: Modules for lattices in order, each with its condition on switches.
+#: Modules for lattices, in the order in which they are printed, each with its condition on switches.
 LATTICE_MODULES = {
     "errors": "",
     "march": "",
@@ -148,7 +148,7 @@ MEMBERS = {
     "lattice_observed_fields": "OBSERVED_FIELDS",
 }
 
-#: Hooks: functions that are called as statements of their own. Each has the condition under which its calls remain.
+#: Hooks: functions whose calls are whole statements. Each has the condition under which its calls remain.
 HOOKS = {
     "addPosition": "POSITION",
     "addPositions": "POSITION",

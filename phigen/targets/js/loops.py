@@ -16,7 +16,9 @@ DIALECT = Dialect(
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
-    """Return a function of the loop IR as JavaScript; ``names`` are those of other functions in the file."""
+    """Return a function of the loop IR as JavaScript. Its identifiers differ from ``names``, the names of other
+    functions in the file.
+    """
     head = f"function {camel(lowered.name)}({', '.join(lowered.parameters)}) {{"
     if not lowered.body:
         return "\n".join([*comment(lowered.doc), f"{head}}}"])
@@ -24,7 +26,9 @@ def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
 
 
 def statements(lowered: ir.Function, names: Iterable[str] = ()) -> list[str]:
-    """Return the lines of the body of a function; ``names`` are those of other functions in the file."""
+    """Return the lines of the body of a function. Its identifiers differ from ``names``, the names of other functions
+    in the file.
+    """
     spelling = Spelling(DIALECT, {*lowered.parameters, *names}, lowered.body)
     return [line for s in lowered.body for line in _statement(s, spelling, "  ")]
 

@@ -26,7 +26,7 @@ PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool], policies: Mapping[str, Policy]) -> str:
-    """Return the modules as a single text, after the constants of the policies that they import."""
+    """Return the text of all modules. It begins with the constants of the policies that the modules import."""
     lines = {name: _lines(name, features) for name in modules}
     imported = {match[1]: None for each in lines.values() for line in each if (match := _IMPORT.fullmatch(line))}
     constants = [JAVASCRIPT.text(policies[name]) for name in imported if name in policies]
@@ -46,8 +46,8 @@ def _module(name: str, lines: list[str]) -> str:
 
 
 def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the lines of a text that its conditions on ``features`` select. Raises `KeyError` for an unknown
-    feature.
+    """Return the lines of a text that remain when its conditions on ``features`` are evaluated. Raises `KeyError` for
+    an unknown feature.
     """
     lines, open_ = list[str](), [True]
     for line in text.splitlines():
@@ -76,8 +76,9 @@ def _included(line: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _parts(line: str) -> tuple[str, str, str]:
-    """Return the indentation of a directive and its two words. In a comment of several lines, the indentation includes
-    the ``*`` at the beginning of the line.
+    """Return the indentation of a directive and its two words; for other lines, return three empty texts.
+
+    In a comment of several lines, the indentation includes the ``*`` at the beginning of the line.
     """
     words = line.split()
     indent = line[: len(line) - len(line.lstrip())]

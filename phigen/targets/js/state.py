@@ -29,8 +29,8 @@ class Option:
 
 @dataclass(frozen=True)
 class StateFields:
-    """Fields of a solver that belong together. Solvers have them if the condition ``when`` holds for their switches; ""
-    holds for all solvers.
+    """Fields of a solver that belong together. A solver has them if the condition ``when`` holds for its switches. The
+    condition "" always holds.
 
     ``fields`` are lines of the class. ``saved`` are the names of the fields that are restored if a step fails.
     ``options`` are options of the constructor. ``arguments`` are lines of JSDoc that describe additional arguments of a

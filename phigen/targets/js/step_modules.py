@@ -23,9 +23,9 @@ class StepModule:
     """The parts of a module that depend on the kind of step. Each part is a function that receives the program and the
     step.
 
-    ``constants`` are printed before the kernels, and ``series`` after them. ``kernels`` are the kernels that the
-    runtime calls; kernels of attitudes may replace some of them. `phigen.targets.js.files` lists the modules of the
-    runtime for each kind.
+    ``constants`` are printed before the kernels, and ``series``, the recurrences for paths, after the kernels.
+    ``kernels`` are the kernels that the runtime calls. If the program has attitudes, kernels of attitudes may replace
+    some of them. `phigen.targets.js.files` lists the modules of the runtime for each kind.
     """
 
     kernels: Callable[[Program, Any], Sequence[Kernel | None]]

@@ -41,7 +41,7 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
 
 
 def _turn_of_stage(attitude: Attitude, solved: str, *, collocates: bool) -> str:
-    """Return the expression for the attitude increment of a stage, from which the identity is subtracted.
+    """Return the expression for the attitude increment of a stage minus the identity.
 
     ``solved`` is the expression for the solution of the stage. ``collocates`` says that the step is a Gauss step.
     """

@@ -16,7 +16,7 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the generated file by its name. ``command`` is the command that regenerates it, for the header."""
+    """Return the generated file by its name. Its header says that ``command`` regenerates it."""
     body = _body(program)
     return {f"{program.name}.py": sealed(header_lines(program, command), body, "# ", "", "")}
 
@@ -91,8 +91,8 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """Return the transposed kernel ``prepare`` with a second result: the cotangent of the energy level e. It is an
-    empty list if the program has no energy level.
+    """Return the transposed kernel ``prepare`` with two results. The second result is the cotangent of the energy level
+    e, or an empty list if the program has no energy level.
     """
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 

@@ -51,9 +51,9 @@ def over_states(function: ir.Function) -> ir.Function:
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
-    """Return the transpose of a kernel that computes matrix exponentials, as the text of several functions.
+    """Return the transpose of a kernel that computes matrix exponentials, as the text of three functions.
 
-    There is a function for the matrices, and a function that receives the cotangents of the matrices.
+    The first function computes the matrices, the second receives their cotangents, and the third calls the other two.
     """
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
     names = {i: "parameters" if i == "params" else i for i in kernel.inputs}
@@ -90,8 +90,8 @@ def _result(program: Program, kernel: Kernel, values: Mapping[str, Sequence[str]
 
 
 def _state(kernel: Kernel) -> str:
-    """Return the name of the argument that holds states (..., DIM) and determines the shape of results; "" if there is
-    none.
+    """Return the name of the argument that holds states, of the shape (..., DIM); "" if there is none. The states
+    determine the shape of results.
     """
     others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
     return next((a for a in others if kernel.inputs[a] and not isinstance(kernel.inputs[a][0], Symbol)), "")

@@ -70,7 +70,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
 
 
 def _of_bodies(step: Sweeps) -> dict[str, object]:
-    """Return the values for templates on bodies in relative coordinates."""
+    """Return the template values for bodies in relative coordinates."""
     relative = step.relative
     if not relative:
         return {"relative": False}

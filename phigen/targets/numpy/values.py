@@ -14,8 +14,8 @@ _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
     step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them."""
 
-#: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in tau,
-#: the time of a monitor.
+#: Sentences for docstrings in generated modules. Their subjects are the gauge, the energy level, and steps of equal
+#: size in tau, where tau is the time of a monitor.
 _OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
     overrides the choice of the solver: the step is a Poisson map for each fixed gauge."""
 _OF_LEVEL = """gauge overrides e = -H(x0): the step
@@ -33,7 +33,9 @@ def values_of(program: Program) -> dict[str, object]:
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
-    """Return the values for templates on gauges, energy levels, steps in tau, and correctors at the ends of runs."""
+    """Return the template values that concern gauges, energy levels, steps in tau, and correctors at the ends
+    of runs.
+    """
     corrected = program.step.corrected
     return {
         "gauge": listed(program.held),
@@ -74,7 +76,7 @@ def _of_time(program: Program) -> dict[str, object]:
 
 
 def _of_step(program: Program) -> dict[str, object]:
-    """Return the values for templates on the kind of step, its coefficients and stages, and its iteration."""
+    """Return the template values that concern the kind of step, its coefficients and stages, and its iteration."""
     step = program.step
     inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
     longest = PathPolicy().longest_path

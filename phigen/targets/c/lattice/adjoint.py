@@ -83,13 +83,15 @@ class Back:
 class _Pulled:
     """A transposed kernel of a ``sweep`` or of a stage, and the arrays of its cotangents.
 
-    The kernel reads cotangents of its outputs, which are symbols of the kind ``seed``. They are in the arrays of
-    cotangents with the numbers ``bars`` or, if ``bars`` is empty, in the variation of the row. ``gather`` has the sums
-    that the kernel reads. ``ends`` has three items for each of these sums: its kernel, the parameters that change sign
-    at the end b of a bond, and its transpose. ``before`` are statements that a row segment executes before the calls.
-    The kernel recomputes the fields ``recomputed``. If ``undo`` is set, the kernel ``undo`` does this instead; it reads
-    sums that the transposes over bonds or pairs compute. ``taken`` are the contributions of the previous flow of the
-    reverse pass, which this kernel adds.
+    The kernel reads the cotangents of the outputs of the original kernel, as symbols of the kind ``seed``. These
+    cotangents are in the arrays with the numbers ``bars`` or, if ``bars`` is empty, in the variation of the row.
+    ``gather`` has the sums that the kernel reads. ``ends`` has three items for each of these sums: its kernel, the
+    parameters that change sign at the end b of a bond, and its transpose. ``before`` are statements that a row segment
+    executes before the calls.
+
+    The fields ``recomputed`` are recomputed by the kernel or, if ``undo`` is set, by the kernel ``undo``. The kernel
+    ``undo`` reads sums that the transposes over bonds or pairs compute. ``taken`` are the contributions of the previous
+    flow of the reverse pass, which the transposed kernel adds.
     """
 
     kernel: Kernel
@@ -278,8 +280,8 @@ class _Reverse(RowLoops):
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a transposed kernel for a row segment.
 
-            If sin and other elementary functions have versions for small and for all arguments, there is a call for
-            each.
+            If the kernel calls functions such as sin that have one version for small and one for all arguments, there
+            are two calls, one for each version.
             """
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
             on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)
@@ -319,7 +321,7 @@ class _Reverse(RowLoops):
     def _cleared(self, handed: Sequence[Handed]) -> Iterator[ir.Statement]:
         """Yield the statements that clear the arrays of contributions to other sites.
 
-        They are needed if loops omit some of the sites.
+        The arrays must be cleared if loops omit some of the sites.
         """
         for array in sorted({h.array for h in handed}):
             row = self.row_drivers.first_of_row(_HANDED, array)

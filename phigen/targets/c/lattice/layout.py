@@ -36,11 +36,12 @@ class Layout(RowLayout):
     """
 
     halo: int = 0
-    slopes: bool = True  # whether the code has kernels of variations; otherwise it takes differences of sweeps
+    # whether the code has kernels of variations; without them, the solver takes differences of sweeps
+    slopes: bool = True
 
     @property
     def program(self) -> Program:
-        """The program of the lattice: the kernels and stages of a step, of which the C consists."""
+        """The program of the lattice: its kernels, and the stages of a step."""
         return self.lattice.program
 
     @property
@@ -54,8 +55,8 @@ class Layout(RowLayout):
 
     @property
     def partners(self) -> Partners:
-        """The kernels of sums over bonds or pairs. Those of variations are left out unless the code has kernels of
-        variations.
+        """The kernels of sums over bonds or pairs. Kernels of variations of sums are left out unless the code has
+        kernels of variations.
         """
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))
@@ -73,7 +74,7 @@ class Layout(RowLayout):
     def sums_up(self) -> bool:
         """Whether observables compute sums over bonds in inner loops of their own.
 
-        This is so if no stage needs the sums, so that they are not stored for all sites.
+        They do so on graphs if no stage needs the sums. The sums are then not stored for all sites.
         """
         return self.graph and self.step.equation is None
 

@@ -31,8 +31,8 @@ from phigen.targets.header import plain, sentence
 #: Pattern of the name of a part of H in comments.
 _PART = re.compile(r"\bH_\d+")
 
-#: Number of doubles in the buffer for densities of observables: two memory pages, a quarter of the L1 cache. It is
-#: larger if there are more observables.
+#: Number of doubles in the buffer for densities of observables: two memory pages, a quarter of the L1 cache. If a
+#: solver has more observables than this, the buffer is larger.
 _BUFFER = 1024
 
 #: The versions of elementary functions that are called, by form (`phigen.ir.passes.forms`).
@@ -65,13 +65,13 @@ def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
 
 
 def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
-    """Return the parameters and statements of a loop. Two loops do the same if these are equal."""
+    """Return the parameters and statements of a loop. Loops with equal parameters and equal statements do the same."""
     return loop.parameters, loop.body
 
 
 def share(densities: Kernel) -> int:
-    """Return the number of sites for which the densities of observables are computed in one pass, so that they fit the
-    buffer.
+    """Return the number of sites for which the densities of observables are computed in one pass. It is limited by the
+    size of the buffer.
     """
     return max(1, _BUFFER // len(densities.roots))
 
@@ -159,10 +159,11 @@ class RowLoops:
             yield over or row_loops.over_pairs(one, self.layout)
 
     def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
-        """Return the additional arguments of a loop over bonds, in short code where several parts of H share this loop.
+        """Return the additional arguments of a loop over bonds; () if it has none. In short code, a loop has these
+        arguments if several parts of H share it.
 
-        They are the arrays of parameters at bonds, the direction in which bonds are read (1 or −1), and a flag: whether
-        the sites of the chosen colour are at the opposite ends of bonds.
+        The arguments are the arrays of parameters at bonds, the direction in which bonds are read (1 or −1), and a
+        flag: whether the sites of the chosen colour are at the opposite ends of bonds.
         """
         if self.fast or self.layout.step.adjoint or not self.layout.graph:
             return ()
@@ -199,8 +200,9 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        First it calls the functions that compute sums over bonds or pairs. On a graph without implicit stages nothing
-        else needs these sums; there, they are computed in inner loops over the bonds of each site.
+        First it calls the functions that compute sums over bonds or pairs. On a graph without implicit stages, the
+        function computes the sums itself, in inner loops over the bonds of each site, since nothing else needs the
+        sums.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

@@ -78,7 +78,8 @@ def declarations(program: Program, step: Sweeps) -> str:
 def _differences(program: Program) -> int:
     """Return the number of past differences from which the predictor of a stage extrapolates.
 
-    The differences are those of y − x: the solution of the stage minus the state at its start.
+    The differences are those of y − x, where y is the solution of the stage and x is the state at the start of the
+    stage.
     """
     return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
@@ -94,7 +95,8 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     """Return the number of arrays over the sites in the memory of a solver, including the fields and parameters."""
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
-        stage = 2 if layout.slopes else 3  # y before and after a sweep, and its variation
+        # y before and after a sweep; without kernels of variations, a perturbed y as well
+        stage = 2 if layout.slopes else 3
         stage += len(program.fractions) * _differences(program) * has["SWEEP_PREDICTORS"]
         stage += (
             has["BANDED"]
@@ -158,7 +160,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 
 def model(program: Program, step: Sweeps) -> str:
-    """Return the text of the tables, and of the functions that check parameters, compute coefficients, or are
+    """Return the text of tables and of functions. The functions check parameters or compute coefficients, or they are
     elementary functions that loops call.
     """
     layout = layout_of(program, step)

@@ -86,10 +86,10 @@ def drivers(loops: RowLoops) -> RowDrivers:
 class _Call:
     """Call of a loop for some sites of a row segment.
 
-    If ``order`` or ``bonds`` is not empty, the loop reads the fields, or the parameters at bonds, in this order. Before
-    the call, the record of the segment receives the ``colour`` of the sweep, and its ``window``: the set of boundary
-    seams that the sweep treats. ``shared`` is the name of the loop if several parts of H call it. ``others`` are calls
-    that may replace this one.
+    If ``order`` is not empty, the loop reads the fields in this order. If ``bonds`` is not empty, it reads the
+    parameters at bonds in this order. Before the call, two values are stored in the record of the segment: the
+    ``colour`` of the sweep, and its ``window``, the set of boundary seams that the sweep treats. ``shared`` is the name
+    of the loop if several parts of H call it. ``others`` are calls that may replace this one.
     """
 
     loop: ir.Function
@@ -165,8 +165,8 @@ class _PartLoops:
     def _gathering(self, remainder: int, threads: int) -> str:
         """Return the text of the row driver for sums over pairs of bodies in relative coordinates.
 
-        ``remainder`` is the index of the part of H that reads the sums. The driver uses several threads for more than
-        ``threads`` sites, unless this is 0.
+        ``remainder`` is the index of the part of H that reads the sums. If ``threads`` is not 0, the driver uses
+        several threads for lattices of more than ``threads`` sites.
         """
         layout, program = self.loops.layout, self.loops.program
         gathers = [sweep.gather for sweep in self.parts[remainder] if sweep.gather]
@@ -181,9 +181,10 @@ class _PartLoops:
         return commented(drivers(self.loops).driver(name, title, parameters, [case], threads=threads), program)
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
-        """Return the calls that apply the flow of a part of H to a row segment, for each form of elementary functions.
+        """Return the calls that apply the flow of a part of H to a row segment, for each form of elementary
+        functions.
 
-        In short code, one loop serves for several orders of the fields.
+        In short code, sweeps that differ in the order of the fields only may share a loop.
         """
         layout, program = self.loops.layout, self.loops.program
         forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
@@ -193,8 +194,8 @@ class _PartLoops:
             calls_of_forms[form] = []
             for sweep in part:
                 calls = [*self._calls(sweep, form, versions)]
-                # Loops with sums are not shared in this way if there are transposes, which have separate loops for
-                # sums.
+                # If there are transposes, sweeps with sums do not share a loop, since the transposes have separate
+                # loops for sums.
                 for order in () if sweep.gather and layout.step.adjoint else tried:
                     other = turned(layout.step.sites, fields, order, sweep)
                     for k, call in enumerate(self._calls(other, form, versions) if other else ()):
@@ -292,7 +293,9 @@ def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]
 
 
 def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]:
-    """Yield the statements that call loops. Before a call, the record of the segment receives what the loop reads."""
+    """Yield the statements that call loops. Before each call, the values that the loop reads are stored in the record
+    of the segment.
+    """
     order: tuple[str, ...] = ()
     colour: int | None = 0
     window: int | None = 0
@@ -312,14 +315,18 @@ def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]
 
 
 def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays with pointers to the parameters at bonds, in other orders."""
+    """Yield the declarations of arrays with pointers to the parameters at bonds, one array for each order in
+    ``used``.
+    """
     listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
         yield _arrays(order, [ir.entry(ir.Member(S, "at_bonds"), listed.index(p)) for p in order])
 
 
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays with pointers to fields and parameters at sites, in other orders."""
+    """Yield the declarations of arrays with pointers to fields and to parameters at sites, one array for each order in
+    ``used``.
+    """
     for order in dict.fromkeys(order for order in used if order):
         increments = turned_increments(layout.step.sites, layout.lattice.arrays, order)
         other = {**dict(zip(layout.lattice.arrays, order, strict=False)), **increments}
