@@ -129,9 +129,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` selects the row of the
-    next flow. If ``size`` is None, it is the number of the row. Otherwise it is the address of the row, and a row has
-    ``size`` coefficients.
+    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` refers to the row of
+    the next flow. If ``size`` is None, the variable is the number of this row. Otherwise it is the address of this row,
+    and each row has ``size`` coefficients.
     """
 
     def further(count: int) -> ir.Value:
@@ -156,8 +156,8 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
     """Return the function that adds the increments of a flow to the values ``updated`` of all members of a
     group.
 
-    ``form`` is the suffix of the name of the function. The suffix says whether sin and other elementary functions are
-    replaced by versions for small or for all arguments (`phigen.ir.passes.forms`).
+    ``form`` is the suffix of the name of the function. The suffix says which versions of sin and other elementary
+    functions are called: those for small arguments, or those for all arguments (`phigen.ir.passes.forms`).
     """
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
@@ -178,8 +178,8 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
     """Return the function that applies all flows of a step to all members of a group.
 
-    ``form`` is the suffix of the name of the function. The suffix says whether sin and other elementary functions are
-    replaced by versions for small or for all arguments (`phigen.ir.passes.forms`).
+    ``form`` is the suffix of the name of the function. The suffix says which versions of sin and other elementary
+    functions are called: those for small arguments, or those for all arguments (`phigen.ir.passes.forms`).
     """
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
@@ -202,13 +202,14 @@ _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": 
 
 @dataclass(frozen=True)
 class Transposed:
-    """Description of the transposed kernel of one flow: the indices of the values that the kernel computes and
+    """Description of the transposed kernel of one flow, by the indices of the values that the kernel computes and
     reads.
 
-    The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; all other
-    contributions are always 0. It recomputes the coordinates ``before`` the flow. It reads ranges of coordinates, with
-    pairs (first index, length) in ``reads``. ``far`` says whether the flow has a second version, in which elementary
-    functions are correct for all arguments; ``far_back`` says the same about the transpose.
+    The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; contributions to
+    other cotangents are always 0. The kernel also recomputes the values that the coordinates with the indices
+    ``before`` had before the flow. ``reads`` has the coordinates that the kernel reads, as ranges (first index,
+    length). ``far`` says whether the flow has a second version, in which elementary functions are correct for all
+    arguments; ``far_back`` says the same about the transpose.
     """
 
     state: Sequence[int]
@@ -272,7 +273,7 @@ class FlowTransposes:
     def group_flows(self) -> ir.Function:
         """Return the function that applies a flow to all members of a group.
 
-        Before this, the function stores the coordinates for the transpose of the flow.
+        The function first stores the coordinates, which the transpose of the flow needs.
         """
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
@@ -324,7 +325,7 @@ def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.St
     """Return the call of a function ``name`` for SIMD lanes.
 
     The function may have a second version, in which sin and other elementary functions are correct for all arguments.
-    Then the second version is called for a group of members whose flag ``far`` is set.
+    The second version is called for groups of members whose flag ``far`` is set.
     """
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:

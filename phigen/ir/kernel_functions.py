@@ -21,8 +21,8 @@ def kernel_function(
     """Return the function of a kernel: declarations of the values that it reads, temporaries, then stores.
 
     ``members`` maps parameters of the system to their names in the record of parameters; ``arrays`` renames arguments.
-    Parameters of the system get variables if ``named`` is true. Symbols that are not in the spec never get a variable.
-    A value without a variable is read from its array or record wherever it is used.
+    With ``named``, parameters of the system get variables. Values that have no name in the spec never get a variable. A
+    value without a variable is read from its array or record wherever it is used.
     """
     arguments = [*kernel.inputs, *(o.name for o in kernel.outputs)]
     names = {argument: ir.fixed((arrays or {}).get(argument, argument)) for argument in arguments}

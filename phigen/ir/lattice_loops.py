@@ -222,8 +222,8 @@ class LatticeLoops:
 
     @cached_property
     def derived(self) -> dict[str, str]:
-        """The names of the arrays of derived values, which solvers compute for each site, and the members that store
-        them.
+        """The arrays of derived values, which solvers compute for each site: the name of each array, and the member
+        that stores it.
         """
         return {symbol: symbol.kind for symbol in self.step.sites.derived}
 
@@ -264,8 +264,8 @@ def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis. The symbol for the weight of the term contains
-    them in its ``key``.
+    """Return the least and the largest offset of a term along each axis. The offsets are stored in ``key``, the key of
+    the symbol for the weight of the term.
     """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

@@ -41,10 +41,11 @@ class SumLaunch:
 
 @dataclass(frozen=True)
 class SiteLaunch:
-    """Data for launching a kernel over the sites of a lattice, after the kernels of the ``sums`` that it reads.
+    """Data for launching a kernel over the sites of a lattice. Before it, the kernels of the ``sums`` that it reads are
+    launched.
 
-    ``outputs`` is the number of its outputs per site. ``colour``, ``inside`` and ``window`` select sites as in
-    `phigen.ir.nodes.Selection`.
+    ``outputs`` is the number of outputs of the kernel per site. ``colour``, ``inside`` and ``window`` select sites as
+    in `phigen.ir.nodes.Selection`.
     """
 
     kernel: str
@@ -57,7 +58,8 @@ class SiteLaunch:
 
 @dataclass(frozen=True)
 class LatticeLaunches:
-    """Data for launching the kernels of a lattice: the sweeps of each of the ``parts`` of H, and ``others`` by name.
+    """Data for launching the kernels of a lattice. ``parts`` has the sweeps of each part of H, and ``others`` has all
+    other kernels by name.
 
     ``arrays`` are the names of the array arguments, which follow the first five arguments of all kernels. ``seams`` has
     a pair (colour, offset) for each weight of terms near boundary seams. ``numbers`` are the parameters with one value

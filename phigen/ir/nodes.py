@@ -22,8 +22,8 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
 #: Kinds of symbols for variables that are not in the spec. Variables of both kinds are printed with the names that the
-#: builder gives. A name of the kind FIXED is reserved, so that the spec cannot use it. A variable of the kind LABEL is
-#: renamed if the spec uses its name.
+#: builder gives. If the spec uses the same name, the kinds differ: the kind FIXED keeps the name, and the name of the
+#: spec is changed; a variable of the kind LABEL is renamed.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -186,8 +186,8 @@ class Time:
 
 @dataclass(frozen=True)
 class Inside:
-    """Weight of a term near open ends: 1 at a site if all values that the term reads there are on the lattice,
-    else 0.
+    """Weight of a term near open ends: 0 at a site if the term there reads values beyond the ends of the lattice, else
+    1.
 
     ``bounds`` has the least and the largest offset of the term along each axis.
     """
@@ -327,7 +327,7 @@ class Declare:
 
 @dataclass(frozen=True)
 class Unpack:
-    """Declaration of constants for the members, or the items, of one value, such as a tuple."""
+    """Declaration of several constants: the members or items of one value, such as a tuple."""
 
     names: tuple[str, ...]
     value: Value
@@ -377,7 +377,7 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """Assignment of a value to a place in memory, and to the places ``too``. If it ``adds``, the value is added."""
+    """Assignment of a value to a place in memory and to all places in ``too``. If it ``adds``, the value is added."""
 
     target: Value
     value: Value
@@ -425,9 +425,10 @@ class Selection:
     """The sites over which a loop runs.
 
     With a ``colour``, they are the sites of this colour. ``inside`` excludes the sites near boundary seams. With a
-    ``window``, the loop runs over the sites near seams that terms on certain seams reach; the bits of ``window`` are
-    the axes of these seams. Sites with numbers below ``first`` are excluded. ``massive`` excludes the sites after the
-    last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site of a pair.
+    ``window``, the loop runs over sites near boundary seams, and evaluates the terms that begin on certain seams; the
+    bits of ``window`` are the axes of these seams. Sites with numbers below ``first`` are excluded. ``massive``
+    excludes the sites after the last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the
+    second site of a pair.
     """
 
     colour: int | None = None
@@ -442,12 +443,13 @@ ALL_SITES = Selection()
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop over sites, bonds or pairs. On the level of memory, the ``variable`` runs from ``low`` to ``high`` − 1.
+    """Loop over sites, bonds or pairs. On the level of memory, the ``variable`` counts from ``low`` on and stays below
+    ``high``.
 
     ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
     "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
-    ``threads`` sites. Loops of the kinds "line" and "search" have one statement in their body; in a "search", this
-    statement may end the function.
+    ``threads`` sites. The body of a loop of the kind "line" or "search" is a single statement. In a "search", this
+    statement may return from the function.
     """
 
     kind: str
@@ -484,9 +486,7 @@ class Discard:
 
 @dataclass(frozen=True)
 class If:
-    """Statements that are executed if a condition is true, and ``otherwise`` statements that are executed if it is
-    false.
-    """
+    """Statements that are executed if a condition is true. The statements ``otherwise`` are executed if it is false."""
 
     condition: Value
     then: Block

@@ -327,7 +327,8 @@ class _LaneFunctions:
     def source(
         self, name: str, array: str, entries: Sequence[tuple[int, ir.Value, SeriesEntry]], whose: str
     ) -> ir.Function:
-        """Return the function that adds ``entries``, at order k, to derivatives of the path.
+        """Return the function that adds terms of order k to derivatives of the path, one term for each of
+        ``entries``.
 
         An entry is a triple: the index of the derivative, a factor, and an entry of ∂(π p)/∂m, π or ∂(π p)/∂c, where c
         is a coefficient.
@@ -382,7 +383,8 @@ def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
 
 
 def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.Value]]:
-    """Return a convolution at order k (see `ConvolutionTerm`) as two parts: the summand of order j, and the end terms.
+    """Return a convolution of series a and b at order k (see `ConvolutionTerm`) as two parts: the summand of order j,
+    and the end terms.
 
     The summand contains a_j b_{k−j} for 0 < j < k; for some kinds of convolutions, the caller multiplies the sum by
     1/k. The end terms contain coefficients of order 0 and k.

@@ -44,7 +44,8 @@ class RowSegment:
     sites.
 
     ``orders`` are declarations that all segments share. The calls change the fields with the numbers ``updated`` among
-    the ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo again.
+    the ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo, the copies of sites
+    beyond both ends of a row.
     """
 
     calls: ir.Block

@@ -20,7 +20,7 @@ SOLVER, AT_BONDS = ir.Member(ROW, "s"), ir.Member(ir.Member(ROW, "s"), "at_bonds
 FROM, TO, LENGTH = ir.Member(ROW, "from"), ir.Member(ROW, "to"), ir.Member(SOLVER, "length")
 
 READ, WRITTEN = ir.Pointer(constant=True, restricted=True), ir.Pointer(constant=False, restricted=True)
-#: Member of the row record that has the arrays, for each kind of storage.
+#: For each kind of storage, the member of the row record that holds the arrays of this kind.
 _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "start", Storage.OUTPUT: "out"}
 
 
@@ -68,12 +68,12 @@ class RowLayout:
 
 @dataclass(frozen=True)
 class Reading:
-    """Options of `RowDeclarations`, which say how a function accesses arrays.
+    """Options of `RowDeclarations`. They say how a function accesses arrays.
 
-    ``updated`` are the fields that it writes. ``seeds`` maps kinds of cotangents to the arrays that contain them. With
-    ``local``, the function sums over the bonds of a site in local variables. ``here`` is the end of the bond or pair at
-    which the site of the loop lies. ``at_bonds`` is the array of parameters at bonds; the ``oriented`` ones have the
-    opposite sign for the site at the end b.
+    ``updated`` are the fields that the function writes. ``seeds`` maps kinds of cotangents to the arrays that contain
+    them. With ``local``, the function sums over the bonds of a site in local variables. ``here`` is "a" or "b", the end
+    of the bond or pair at which the site of the loop lies. ``at_bonds`` is the array of parameters at bonds. The
+    parameters ``oriented`` have the opposite sign for the site at the end b.
     """
 
     updated: frozenset[str] = frozenset()
@@ -201,7 +201,7 @@ class RowDeclarations:
             self._once(name, local_name, in_row)
             return
         in_open_rows: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # read before the loop, which gcc does not vectorise otherwise
+        if not self.layout.single_row:  # gcc does not vectorise a loop that reads this value
             in_open_rows = ir.fixed(f"there{value.number}")
             self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)

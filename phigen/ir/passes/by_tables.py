@@ -1,19 +1,21 @@
 """Lowering by tables: one array contains the fields of all sites, and tables contain the numbers of neighbouring sites.
 
 Functions receive coefficients or parameters, arrays of reals, and the record ``sites``. The runtime of a target fills
-this record:
+the following members of this record:
 
 - ``count``: the number of sites
 - ``params``: the parameters, those at sites and at bonds as arrays
 - ``t``: the time
-- ``near``: for each offset, the neighbours of all sites
-- ``present``: for each term at open ends, 1 or 0 at each site
-- ``coloured``, ``inside`` and ``beside``: the sites that a sweep updates
+- ``near``: for each offset, an array with the number of the neighbour of each site
+- ``present``: for each term near open ends, an array that is 1 at sites where the term exists, else 0
+- ``coloured``: for each colour, the numbers of its sites
+- ``beside``: the numbers of the sites in or near boundary seams
+- ``inside``: the numbers of all other sites, for each colour and together
 - ``colours``: the colour of each site
-- ``sums``: sums over bonds or pairs, one after another
-- ``dw``: the increments of noise
-- derived values, which parameters determine: an array over the sites for each, by its name
-- ``massive``: in sums over pairs, the number of the site after the last with a mass
+- ``sums``: an array for each sum over bonds or pairs, one after another
+- ``dw``: an array for each source of noise, one after another
+- an array for each derived value, under its own name; parameters determine these values
+- ``massive``: for sums over pairs, the number of the first site after the last site that has a mass
 
 The runtime also defines the methods ``bonds`` and ``begins`` of ``sites``, and the functions ``fill``, ``placed`` and
 ``joinSums``. ``templates/js/runtime/sites.mjs`` is a model for other runtimes.
@@ -34,8 +36,7 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: Names of arrays in JavaScript: for each kind of storage, and for those parameters of functions that have other names
-#: in JavaScript.
+#: Names of arrays in JavaScript by kind of storage, and names of those parameters of functions that JavaScript renames.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
@@ -52,8 +53,8 @@ def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 class _Tables:
     """The lowering of one function.
 
-    ``head`` has the declarations before the loops of the function, and ``hoisted`` the variables that these
-    declarations define.
+    ``head`` has the declarations before the loops of the function, and ``hoisted`` the variables that are declared
+    already.
     """
 
     function: ir.Function
@@ -181,7 +182,9 @@ class _Tables:
         return ir.Name(Symbol("beside", self.lattice.neighbours.index(load.offset)))
 
     def _neighbour(self, load: ir.Load) -> Iterator[ir.Statement]:
-        """Yield the declaration of the number of a neighbouring site, unless the loop has declared it already."""
+        """Yield the declaration of the variable with the number of a neighbouring site, unless the variable is declared
+        already.
+        """
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)
@@ -195,7 +198,9 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the calls that set maxima and minima to their initial values ∓∞. Callers set sums to 0."""
+    """Yield the calls that set maxima and minima to their initial values ∓∞. The callers of the function set
+    sums to 0.
+    """
     for s in loop.stores:
         if s.extreme:
             ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)

@@ -1,7 +1,7 @@
-"""Division of long straight-line functions into parts, since compile time is quadratic in the length of a function.
+"""Division of long straight-line functions into parts: compile time is quadratic in the length of a function.
 
-First, each store is moved to the earliest possible place. Then, temporaries of one part that a later part reads become
-entries of a workspace array.
+First, each store is moved to the earliest possible place. Then the statements are divided into parts. A temporary that
+one part computes and a later part reads becomes an entry of a workspace array.
 """
 
 from __future__ import annotations

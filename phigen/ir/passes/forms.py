@@ -19,9 +19,9 @@ from phigen.symbolic.special import SPECIAL
 #: arguments that the solver defines in place of library functions.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: Versions of elementary functions for loops over lanes (SIMD) and for loops over sites (IN_LANES). Functions with a
-#: removable singularity are not in IN_LANES: for these, loops over sites only call polynomials for small arguments.
-#: FULL_RANGE has the members of IN_LANES that are correct for all arguments.
+#: Versions of elementary functions: SIMD for loops over lanes, IN_LANES for loops over sites. Functions with a
+#: removable singularity are not in IN_LANES, since loops over sites compute them by polynomials for small arguments
+#: only. FULL_RANGE has the members of IN_LANES that are correct for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}

@@ -1,7 +1,7 @@
-"""Separate loops for sites away from open ends, where no term reaches beyond an end, and for sites near open ends.
+"""Separate loops for sites near open ends and for all other sites, where no term reaches beyond an end.
 
-The pass applies to functions on the level of sites, whose values are expression graphs; `phigen.ir.passes.temporaries`
-follows it.
+The pass applies to functions on the level of sites. It comes before `phigen.ir.passes.temporaries`, so values are
+expression graphs.
 """
 
 from __future__ import annotations
@@ -30,14 +30,16 @@ def divided_at_ends(function: ir.Function) -> list[ir.Function]:
 
 
 def _weight(s: ir.Statement) -> str:
-    """Return the name of the weight that a statement declares, if it is the weight of a term at open ends; "" for other
+    """Return the name that a statement declares, if the value is the weight of a term at open ends; "" for other
     statements.
     """
     return s.items[0][0] if isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.Inside) else ""
 
 
 def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield the statements with 1 in place of all weights, without those that then add 0."""
+    """Yield the statements with 1 in place of all weights. Statements that add 0 are left out, as are the declarations
+    of weights.
+    """
     ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
     graphs = (s.value for s in body if isinstance(s, ir.Update))
     values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))

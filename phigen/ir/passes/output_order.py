@@ -26,8 +26,8 @@ def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bo
     left = dict(temporaries)
 
     def taken(names: Iterable[str]) -> list[ir.Statement]:
-        """Return the temporaries that the values ``names`` need, in order, and remove these temporaries from
-        ``left``.
+        """Return the temporaries that the values ``names`` need, in order. Remove them from ``left``, which has the
+        temporaries that are not placed yet.
         """
         needed, rest = set[str](), [*names]
         while rest:

@@ -209,7 +209,9 @@ def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
 
 
 def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
-    """Yield the stores of values for callers. Stores that add become further summands of the value that is assigned."""
+    """Yield the statements that store values in the arrays of callers. Values of stores that add become summands of
+    these values.
+    """
     shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:
         if not s.adds:

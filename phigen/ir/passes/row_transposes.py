@@ -64,11 +64,11 @@ class Handed:
 class Transpose:
     """A transposed function on the level of sites, and the arrays in which its results are stored.
 
-    The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or the
-    variations in the row record if ``fields`` is empty. First it adds the contributions ``received``, which an earlier
-    loop has stored. It stores its contributions to neighbours in the arrays of ``handed``. If the function reads sums
-    over bonds or pairs, ``summed`` is their number, and their cotangents are stored in the arrays from number
-    ``sums_from`` on. It also writes the fields ``recomputed``.
+    The function reads cotangents of the kind ``seed``. They are the cotangents of the fields with the numbers
+    ``fields`` or, if ``fields`` is empty, the variations in the row record. First the function adds the contributions
+    ``received``, which an earlier loop has stored. It stores its own contributions to neighbours in the arrays of
+    ``handed``. ``summed`` is the number of sums over bonds or pairs that the function reads; the cotangents of these
+    sums are stored in the arrays from number ``sums_from`` on. The function also writes the fields ``recomputed``.
     """
 
     function: ir.Function
@@ -175,9 +175,9 @@ def _added_up(
 def in_batches(
     body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
 ) -> Iterator[ir.Statement]:
-    """Yield the loop over sites. It has an inner loop over a batch of sites if there are sums over sites.
+    """Yield the loop over sites. If there are sums over sites, it contains an inner loop over a batch of sites.
 
-    Each site of a batch then has its own partial sum for each of ``shares``.
+    Each site of a batch then has its own partial sum for each of the sums ``shares``.
     """
     swept = ir.Constant(colour)
     if not shares:
@@ -323,10 +323,9 @@ def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str 
 
 
 def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
-    """Return the statement that uses the result of a loop over the bonds or pairs of a site. The result is a sum,
-    ``value``.
+    """Return the statement that uses ``value``, a sum over the bonds or pairs of one site.
 
-    It is added to a cotangent or to a sum over sites, or stored at the site.
+    The statement adds the value to a cotangent or to a sum over sites, or stores the value at the site.
     """
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)

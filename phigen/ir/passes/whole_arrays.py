@@ -33,7 +33,7 @@ _TRANSPOSED = ("bar", "sites", "coef_bar", "parameters_bar")
 def sums_name(kernel: str) -> str:
     """Return the name of the function that computes all sums over bonds or pairs.
 
-    ``kernel`` is the name of the kernel of these sums at one end of the bonds.
+    ``kernel`` is the name of the kernel that computes these sums at one end of the bonds.
     """
     base = kernel.removesuffix("_a").removesuffix("_b")
     plain = base.removeprefix("bond_").removeprefix("pair_")
@@ -43,7 +43,7 @@ def sums_name(kernel: str) -> str:
 def transposed_sums_name(kernel: str) -> str:
     """Return the name of the transpose of the function that computes all sums over bonds or pairs.
 
-    ``kernel`` is the name of the kernel of these sums at one end of the bonds.
+    ``kernel`` is the name of the kernel that computes these sums at one end of the bonds.
     """
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
@@ -52,7 +52,7 @@ def transposed_sums_name(kernel: str) -> str:
 class WholeArrays:
     """The lowering of the functions of a lattice to operations on whole arrays.
 
-    It follows the pass `phigen.ir.passes.temporaries`.
+    The pass `phigen.ir.passes.temporaries` comes before this lowering.
     """
 
     lattice: LatticeLoops
@@ -73,7 +73,7 @@ class WholeArrays:
         """Return a kernel of the implicit equation of a stage as a function of the unknown y and of the state at the
         start of the stage.
 
-        Its parameter for y is named x.
+        The parameter for y has the name x.
         """
         shape = ir.Member(SITES, "sizes")
         values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in function.loop.stores)
@@ -165,8 +165,8 @@ class WholeArrays:
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
     def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements that add contributions to cotangents. Each is added at the site of the value that was
-        read.
+        """Yield the statements that add contributions to cotangents. A contribution is added at the site whose value
+        was read.
         """
         for s in loop.body:
             match s:
@@ -248,7 +248,7 @@ class WholeArrays:
         return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
-        """Yield the lowered declarations before the loop of a function, then those inside the loop."""
+        """Yield the lowered declarations of a function: first those before its loop, then those inside its loop."""
         for s in (*function.body, *function.loop.body):
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -303,8 +303,8 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions, with each body printed only once. If a function differs from an earlier one only in colour
-    or window, its body is a call of the earlier function.
+    """Yield the functions. If a function differs from an earlier one in colour or window only, its body becomes a call
+    of the earlier function.
     """
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:
@@ -331,8 +331,8 @@ def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the first statement of a sweep over boundary seams. It returns at once if the lattice needs no seams, since
-    its sizes are multiples of the periods of the colours.
+    """Yield the first statement of a sweep over boundary seams. If the lattice has no seams, the statement returns the
+    values unchanged. Lattices have no seams if their sizes are multiples of the periods of the colours.
     """
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))

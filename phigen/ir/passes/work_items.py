@@ -64,16 +64,14 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _WorkItems:
-    """Lowering of one function to work items; ``declared`` are the neighbours whose numbers are in variables
-    already.
-    """
+    """Lowering of one function to work items; ``declared`` are the neighbours whose numbers have variables already."""
 
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
 
     def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
         """Yield the statements of a work item, which computes one site. A loop over sites is replaced by its body; a
-        loop over bonds or pairs becomes a loop over those of the site.
+        loop over bonds or pairs becomes a loop over the bonds or pairs of the site.
         """
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
@@ -90,7 +88,7 @@ class _WorkItems:
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
-        """Lower a statement: where it names a site by an offset, the result names an element of an array."""
+        """Yield the lowered form of a statement. A value at an offset from the site becomes an element of an array."""
         match s:
             case ir.Store(array, value, adds):
                 yield from self._stored(array, value, adds=adds)

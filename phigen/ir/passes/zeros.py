@@ -14,10 +14,9 @@ MANY_ZEROS = 6
 
 
 def zeros_first(function: ir.Function) -> ir.Function:
-    """Return the function with added statements. Each array with many zeros is cleared before the first store
-    to it.
+    """Return the function with statements that clear the arrays with many zeros.
 
-    The stores of zeros in these arrays are removed.
+    An array is cleared before the first store to it. The stores of zeros in the array are removed.
     """
     zeros = Counter(stored_array(s) for s in function.body if _is_zero(s))
     sizes = Counter(stored_array(s) for s in function.body)
