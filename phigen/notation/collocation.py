@@ -27,8 +27,9 @@ def equations() -> list[tuple[str, str]]:
 
 
 def lines(compilation: CompiledGauss) -> list[str]:
-    """Return lines of text: for each part of the state, the unknowns of its stages; last, whether the step is
-    Poisson."""
+    """Return lines of text. For each part of the state, a line names the unknowns of the stages. The last line says
+    whether the step is a Poisson map.
+    """
     listed_lines, names = [], compilation.system.coordinates
     for part in compilation.gauss.parts:
         unknowns = ", ".join(names[i] for i in part.indices)

@@ -42,7 +42,7 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
-    """Return the distinct matrix exponentials of all flows, as pairs of a number and a matrix exponential.
+    """Return the distinct matrix exponentials of all flows, each in a pair with its number.
 
     The number is a text; it is "" if there is only one matrix exponential.
     """

@@ -70,10 +70,12 @@ def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Gener
 
 
 def modified_formulas(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[int, Formula]]:
-    """Return the first ``count`` corrections of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs (j, H_j).
+    """Return the first ``count`` corrections of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs (j,
+    H_j).
 
-    For the count 0, return the first correction if it is cheap to compute, else []. Raises `SpecError` for other counts
-    if the method is no series, is a composition, or has an approximate bi-realisation, and for systems with forces.
+    For the count 0, return the first correction if it is cheap to compute, else []. For other counts, raises
+    `SpecError` if the method is not a series, is a composition, or has an approximate bi-realisation, or if the system
+    has forces.
     """
     if not count:
         leading = series_formulas(compilation.by_series(), max_terms).leading if compilation.has_series else None

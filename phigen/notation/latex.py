@@ -19,7 +19,7 @@ Equation = tuple[str, Sequence[str]]
 
 _PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
 _DOTS = f"{_PLUS}<mo>…</mo>"
-#: LaTeX of the function φ of the exponential bi-realisation, and of β if the bi-realisation is symmetric.
+#: LaTeX of the function φ of the exponential bi-realisation, and of the map β of a symmetric bi-realisation.
 _PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
 _BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
 #: Width of an equals sign, and width of the space between two columns of a matrix, in em.
@@ -142,7 +142,8 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 def _equations(
     left: Sequence[str], expressions: Sequence[Expression], continuation: Sequence[str] = ()
 ) -> list[Equation]:
-    """Return the equations of expressions, with ``left`` as left sides, then those of their named subexpressions.
+    """Return an equation for each expression, with ``left`` as left sides, then the definitions of named
+    subexpressions.
 
     ``continuation``, such as an ellipsis, is added to each expression.
     """

@@ -108,7 +108,7 @@ def terms_of(e: Expression) -> Sum:
 
 
 def terms_of_formula(formula: Formula) -> Sum:
-    """Return the terms of a formula, whose divisor is ignored; if terms are hidden, the last one is an ellipsis."""
+    """Return the terms of a formula, without its divisor. If the formula hides terms, an ellipsis is the last term."""
     terms: list[FractionTerm] = []
     for c, monomial in formula.terms:
         terms += _times((FractionTerm(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
@@ -335,7 +335,7 @@ def _one(factor: Factor) -> Sum:
 def exponential(number: str) -> tuple[str, list[str]]:
     """Return the equation E = exp(hA) − 1 in markup: its left side, and the two parts of its right side.
 
-    The number of the matrix follows the letters E and A; "" if there is only one matrix.
+    ``number`` is the number of the matrix, which follows the letters E and A; it is "" if there is only one matrix.
     """
     left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
     return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]

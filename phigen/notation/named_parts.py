@@ -55,7 +55,9 @@ def _all_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
-    """Return the expressions; long ones with names for common subexpressions, short ones possibly multiplied out."""
+    """Return each expression unchanged or multiplied out. Expressions that are long in both forms get names for common
+    subexpressions.
+    """
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}
     for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):

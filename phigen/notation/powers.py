@@ -15,13 +15,14 @@ def as_powers(casimir: Expression) -> str | None:
     return f"log|{'*'.join(factors)}|"
 
 
-#: A linear combination of log x_i² as {name of x_i: coefficient}; the key None has the constant term. None instead of a
-#: dictionary stands for an expression that is no such combination.
+#: A linear combination of log x_i² as {name of x_i: coefficient}; the key None has the constant term. An expression
+#: that is no linear combination of this kind is represented by None.
 _Sum = dict[str | None, Expression] | None
 
 
 def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
-    """Return a node as a linear combination of logarithms of squares of symbols; None if it is not one.
+    """Return a node as a linear combination of logarithms of squares of symbols; None if the node has another
+    form.
 
     ``args`` are the results for the arguments of the node.
     """

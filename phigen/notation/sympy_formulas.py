@@ -38,7 +38,9 @@ class SympyFormulas:
 
 
 class Dictionary:
-    """Translator of the expressions of one compilation to sympy, with the sympy symbols of coordinates, covector, …"""
+    """Translator of the expressions of one compilation to sympy. It has sympy symbols for coordinates, momenta, λ and
+    h.
+    """
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge

@@ -18,7 +18,7 @@ LINE = 31.0
 INDENT, INDENTED = "\\quad ", 1.0
 #: Fraction of a line that may stay empty if this avoids a break one level deeper inside parentheses.
 _SHORTER = 0.35
-#: A break between factors counts as this number of levels deeper in parentheses than a break before a sign.
+#: A break between factors is as bad as a break before a sign that is this number of levels deeper in parentheses.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
@@ -83,9 +83,10 @@ def lines(markup: Sequence[str], room: float) -> list[str]:
 
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
-    """Return the index of the atom before which the line that begins at ``begin`` is broken.
+    """Return the index of the atom with which a new line begins; the present line begins at ``begin``.
 
-    It is the best place within the width ``room`` or, if there is none, the first possible place after it.
+    The break is at the best place within the width ``room``. If no break is possible there, it is at the first possible
+    place after this width.
     """
     width_used, best, least = 0.0, len(atoms), float("inf")
     for position in range(begin, len(atoms)):
