@@ -6,8 +6,8 @@ over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plai
 target has one lowering pass from the level of sites to the level of memory, the only level that printers accept.
 
 A dialect of C, such as that of a device, applies the lowering by rows (`phigen.ir.passes.by_rows`) or by tables
-(`phigen.ir.passes.by_tables`), and prints the result by a `phigen.targets.spelling.Dialect`. It maps ``independent``
-loops and loops over row segments to its threads.
+(`phigen.ir.passes.by_tables`), and prints the result by a `phigen.targets.spelling.Dialect`. The iterations of
+``independent`` loops and of loops over row segments become threads of the device.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ class Pointer:
 class Vector:
     """Array of reals, or of SIMD vectors of reals if ``lanes``; a matrix if it has ``rows``.
 
-    A parameter of this type is an address, and its ``length`` may be unknown (None). As for a `Pointer`, ``constant``
-    means that the function only reads the array, and ``restricted`` that nothing else writes its elements.
+    A parameter of this type is an address, and its ``length`` may be unknown (None). ``constant`` and ``restricted``
+    have the same meaning as in `Pointer`.
     """
 
     length: Value | None
@@ -338,8 +338,8 @@ class Store:
     """Assignment of a value to an element of an array at the site of the loop or, if it ``adds``, addition to this
     element.
 
-    With ``extreme`` "max" or "min", the value replaces the element only if it is larger or smaller. ``offset`` and
-    ``end`` select an element at another site, as in `Load`.
+    With ``extreme`` "max", the value replaces the element only if the value is larger; with "min", only if the value is
+    smaller. ``offset`` and ``end`` select an element at another site, as in `Load`.
     """
 
     array: Array

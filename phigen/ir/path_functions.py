@@ -1,4 +1,4 @@
-"""Builders of the functions for paths, the solutions m(s) of ṁ = π(m)p, by recurrences for their Taylor
+"""Builders of the functions for paths. A path is a solution m(s) of ṁ = π(m)p, computed by recurrences for its Taylor
 coefficients.
 
 Each node of the expression graph of π(m)p has a Taylor series, an array of coefficients by order. The recurrences are
@@ -102,8 +102,8 @@ class PathFunctions:
         return (*reads, *(self.layout.following(i, K, self._rule(q)) for i, q in self.derived))
 
     def slopes(self) -> ir.Block:
-        """Return the statements that compute the Taylor coefficients of order k + 1 of the coordinates from those
-        of ṁ.
+        """Return the statements that compute the Taylor coefficients of order k + 1 of the coordinates from the
+        coefficients of ṁ.
         """
         after, layout = ir.plus(K, 1), self.layout
         values = (
@@ -163,10 +163,10 @@ class PathFunctions:
 
 
 def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Function]:
-    """Return three functions of a path: Taylor coefficients of order 0, those of order k, and the derivative ṁ at a
-    point m.
+    """Return three functions of a path. They compute the Taylor coefficients of order 0, the Taylor coefficients of
+    order k, and the derivative ṁ at a point m.
 
-    ``kind`` begins their names, and describes the path in comments.
+    ``kind`` is the beginning of their names, and describes the path in comments.
     """
     build, n = PathFunctions(program, path, PathLayout()), ir.Constant(program.dimension)
     series, orders = ir.Constant(len(path.series)), ir.Binary("+", ir.fixed("TERMS"), ir.Constant(1))

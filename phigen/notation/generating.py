@@ -9,8 +9,8 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
 from phigen.symbolic.readable import Formula, of_polynomial
 
-#: Largest order p for which the leading correction of the modified Hamiltonian is displayed without request. It is
-#: −h^p S_{p+1}, and S_{p+1} takes long to compute for large p.
+#: Largest order p for which the leading correction of the modified Hamiltonian is displayed without request. The
+#: correction is −h^p S_{p+1}; for large p, S_{p+1} takes long to compute.
 _MODIFIED_UP_TO = 6
 
 

@@ -66,7 +66,7 @@ def system_blocks(system: System) -> list[str]:
 
 
 def _tensor(system: System) -> str:
-    """Return π in LaTeX, as a matrix or, if this is too wide, as a list of brackets of coordinates."""
+    """Return π in LaTeX: as a matrix or, if the matrix is too wide, as a list of brackets of coordinates."""
     names, n = system.coordinates, system.dimension
     cells = [[mathml.expression(e) for e in row] for row in system.poisson]
     total_width = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))

@@ -69,7 +69,7 @@ class Factor:
 
     @property
     def alone(self) -> str:
-        """Markup of the factor if it is the only one, so that a sum needs no parentheses."""
+        """Markup of the factor as the only factor of a term: a sum has no parentheses."""
         return summed(self.terms) if self.terms else self.markup
 
     def power(self, exponent: str) -> Factor:
@@ -264,7 +264,7 @@ def _times(*factors: Sum) -> Sum:
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
-    """Return the factors, with equal ones combined to a power; factors that are powers already are not combined."""
+    """Return the factors. Equal factors are combined to a power, unless they are powers already."""
     counts = Counter(factors)
     powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))

@@ -22,9 +22,9 @@ class SympyFormulas:
     """Formulas of a method in sympy.
 
     ``hamiltonian`` is the Hamiltonian in the equation of the series: H minus λ C for each Casimir C of the gauge;
-    ``gauge`` has the symbols of the multipliers λ. ``alpha`` and ``beta`` are n expressions each, in the coordinates of
-    ``system`` and the components of ``covector``. If these expressions are truncated series, ``degree`` is the degree
-    in the covector, else None. ``series`` has S_1 … S_k, where S_h = Σ h^i S_i.
+    ``gauge`` has the symbols of the multipliers λ. ``alpha`` and ``beta`` have an expression for each coordinate, in
+    the coordinates of ``system`` and the components of ``covector``. If these expressions are truncated series,
+    ``degree`` is the degree in the covector, else None. ``series`` has S_1 … S_k, where S_h = Σ h^i S_i.
     """
 
     system: SympySystem

@@ -1,7 +1,8 @@
 """Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
-A name in a spec that equals such a macro would break generated C, or a program that includes a standard header before
-the header of a solver. Tests compare the lists with the compilers of the machine that runs the tests.
+A name in a spec must not equal a macro of a standard header: generated C would not compile, or a program would not
+compile that includes the standard header before the header of a solver. Tests compare the lists with the compilers of
+the machine that runs the tests.
 """
 
 from __future__ import annotations

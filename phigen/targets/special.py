@@ -1,4 +1,5 @@
-"""Template values, common to all languages, for φ and its derivatives, entire functions, elliptic functions and others.
+"""Template values that all languages share, for φ and its derivatives, entire functions, elliptic functions and
+others.
 
 φ is the function of the exponential bi-realisation, φ(s) = (1 − w cot w)/s with w = √s/2.
 """

@@ -289,8 +289,8 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
 def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over batches of sites, with an inner loop over all other sites.
 
-    A batch consists of whole SIMD vectors of 8 sites; rows are padded for them. For each pair of sites, all terms are
-    computed before the first is added, since gcc does not vectorise the loop otherwise.
+    A batch consists of whole SIMD vectors of 8 sites, so rows are padded to whole vectors. For each pair of sites, all
+    terms are computed before the first is added, since gcc does not vectorise the loop otherwise.
     """
     updates = transpose.updates
     first, left, count, batch = ir.fixed("first"), ir.fixed("left"), ir.fixed("count"), ir.Constant(PAIR_BATCH)

@@ -54,7 +54,8 @@ class Amalgam:
         return left_out(self.switches)
 
     def text(self, file: str, spelt: Callable[[Sequence[str]], Sequence[str]] = lambda lines: lines) -> str:
-        """Return a file with all files that it includes, except those included before.
+        """Return the text of a file. Files that it includes are inserted, except files that were included
+        before.
 
         ``spelt`` translates all lines to another dialect of C.
         """

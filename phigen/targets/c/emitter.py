@@ -71,7 +71,7 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 def unrestricted(program: Program, code: str) -> str:
     """Return code that compilers without ``restrict`` accept as well.
 
-    ``restrict`` is removed, except in loops over lanes and sites: only these loops become faster by it.
+    ``restrict`` remains in loops over lanes and sites only: it makes no other code faster.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")
@@ -300,8 +300,8 @@ def _defaults(program: Program) -> str:
 
 
 def _member_comment(parameter: Parameter, member: str) -> str:
-    """Return the comment on a member of the parameter struct. It has the name of the parameter in the spec if this
-    differs.
+    """Return the comment on a member of the parameter struct. If the name of the member differs from that of the
+    parameter in the spec, the comment has the latter.
     """
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
     comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)

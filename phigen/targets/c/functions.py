@@ -93,8 +93,8 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
     Special functions are φ, its derivatives, and the functions of `ENTIRE`. For a splitting, they include the functions
     that its flows call. On a ``device``, φ is computed without a tangent.
     """
-    # Loops over the sites of a lattice call other versions of these functions, so only the flows of systems without a
-    # lattice count here.
+    # Loops over the sites of a lattice call other versions of elementary functions, so only the flows of systems
+    # without a lattice count here.
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     names = special.used(program, unprinted)
@@ -231,9 +231,7 @@ def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """Return the coefficients of a series without those that the precision of a program does not need. Arguments are at
-    most ``reach``.
-    """
+    """Return the coefficients of a series that the precision of a program needs for arguments up to ``reach``."""
     if not program.single:
         return list(coefficients)
     least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))

@@ -95,7 +95,7 @@ def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
     return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 
-#: The versions of elementary functions that loops over lanes call; they are correct for small arguments only.
+#: The versions of elementary functions that loops over lanes call. Some versions are correct for small arguments only.
 _NEAR = {**SIMD, **{f: f + NEAR for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 

@@ -69,7 +69,8 @@ class Macros:
 
 
 def _arguments(line: str, at: int) -> tuple[list[str], int]:
-    """Return the arguments of the macro whose parenthesis opens at column ``at``, and the column after the closing one.
+    """Return the arguments of the macro whose opening parenthesis is at column ``at``, and the column after the closing
+    parenthesis.
 
     Raises `ValueError` if there are no arguments, or if they do not end on the line.
     """

@@ -118,7 +118,7 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: The members that depend on switches, in the struct with the arguments of the reverse pass of an ensemble.
+#: Members of the struct with the arguments of the reverse pass of an ensemble, without those that all solvers have.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),

@@ -108,8 +108,8 @@ def closing_brace(text: str, at: int) -> int:
 
 
 def used_names(text: str) -> set[str]:
-    """Return the identifiers that a text uses; those in comments, strings and directives, and names of members, do not
-    count.
+    """Return the identifiers that a text uses. Identifiers in comments, strings and directives do not count, nor do
+    names of members.
     """
     return {*_USED.findall(text)} - {""}
 

@@ -28,10 +28,11 @@ class Function:
 
 
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
-    """Return the lines without unused static functions, and without declarations of functions that are not defined.
+    """Return the lines without unused static functions, and without declarations of functions that are not
+    defined.
 
-    A static function is unused if nothing but unused functions calls it. Only functions whose names begin with
-    ``prefix``, that of the solver, are removed.
+    A static function is unused if nothing but unused functions calls it. ``prefix`` is the prefix of the names of the
+    solver. Only functions with this prefix are removed.
     """
     declarations = [*declarations_of(lines)]
     functions = [f for f in declarations if f.name.startswith(prefix)]
@@ -125,7 +126,7 @@ class _Declaration:
     has_body: bool = False
 
     def take(self, token: str, place: int) -> None:
-        """Process the next token that is outside braces, or an opening brace."""
+        """Process the next token. Tokens inside braces are left out by the caller; the opening brace is passed."""
         if not self.first:
             self.first, self.begin = token, place
             self.is_plain = token in _NO_FUNCTIONS or not token[:1].islower()
@@ -149,7 +150,7 @@ class _Declaration:
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
-    """Return the lines without the given functions, and without the comments directly above these."""
+    """Return the lines without the given functions, and without the comments directly above the functions."""
     gone = {k for f in functions for k in range(f.begin, f.end)}
     for begin in sorted({f.begin for f in functions}):
         first = begin - 1

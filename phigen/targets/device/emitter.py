@@ -1,7 +1,7 @@
 """Emission of a program as `NAME_device.h`, a single source for OpenCL C, CUDA and HIP.
 
 The file has three parts: macros for the differences between the languages, the runtime of ``templates/c/runtime`` with
-the switch ``DEVICE``, and a kernel for ensembles. Its style is that of the profile ``small``.
+the switch ``DEVICE``, and a kernel for ensembles. The code has the style of the profile ``small``.
 """
 
 from __future__ import annotations

@@ -185,7 +185,9 @@ class _Reverse(RowLoops):
             )
 
     def _driver(self, title: str, name: str, cases: Mapping[int, RowSegment]) -> str:
-        """Return the text of a row driver that runs one traversal; ``cases`` are its parts, by number."""
+        """Return the text of a row driver that runs one traversal; ``cases`` has the statements for each part, by its
+        number.
+        """
         step, back = self.layout.step, name == "back_rows"
         far = ["coef", *["far"] * bool(self.rows.limited)]
         arrays = ["x", "bar", "handed", *["received"] * (back and takes(self.program, step))]

@@ -106,11 +106,11 @@ class RowLoops:
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the versions of elementary functions with which loops are generated, by the suffix of the names of the
+        """Return the versions of elementary functions that loops call. There is an entry for each suffix of names of
         loops.
 
-        There is a form for small arguments and a form for all arguments, if one of the ``loops`` calls a function that
-        needs both. ``rows`` has the data on loops over sites in SIMD lanes; if it is None, there is a single form.
+        If one of the ``loops`` calls a function that needs both, there is a form for small arguments and a form for all
+        arguments. ``rows`` has the data on loops over sites in SIMD lanes; if it is None, there is a single form.
         """
         if rows is None:
             return {"": self.versions}
