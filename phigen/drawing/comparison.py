@@ -16,7 +16,7 @@ _MARKERS = "osD^vXP*"
 
 @styled
 def figure(comparison: Comparison, title: str) -> Figure:
-    """Return the figure: energy errors on the left, and on the right orbit errors, if they are known.
+    """Return a figure with energy errors on the left. If orbit errors are known, they are on the right.
 
     Methods whose steps are Poisson maps have filled points.
     """

@@ -31,7 +31,7 @@ LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2,
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
-    """Return the largest value in each of a number of windows of rows, and the time of that value.
+    """Return the largest value in each window, and the time of that value. A window consists of successive rows.
 
     A window with a value that is not finite gives NaN. All rows are returned if there are at most twice as many rows as
     windows.
@@ -52,7 +52,7 @@ def grid(methods: Mapping[str, Trajectory]) -> tuple[int, int]:
 
 
 def height(methods: Mapping[str, Trajectory]) -> float:
-    """Return the height of all panels in inches."""
+    """Return the height of all panels together, in inches."""
     return ROW * grid(methods)[0]
 
 

@@ -21,8 +21,8 @@ def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
-    # The scale is chosen without the first hundredth of the time. The transients there are large, and would compress
-    # all later values.
+    # Values in the first hundredth of the time do not determine the scale. They are large transients, and would
+    # compress the curves of all later values.
     late_values = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
     height = 1.2 * float(np.max(late_values)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))

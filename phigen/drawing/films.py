@@ -72,15 +72,15 @@ def _commented(gif: bytes, comment: bytes) -> bytes:
 
 
 def _flat(values: Floats) -> Floats:
-    """Return the values (sizes) to draw: those of a chain or a plane unchanged.
+    """Return the values that are drawn: all values of a chain or a plane.
 
-    Of a three-dimensional lattice, only the plane in the middle of the first axis is drawn.
+    If the lattice has three dimensions, only the plane in the middle of the first axis is drawn.
     """
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 
 def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> Any:
-    """Draw a coordinate on a graph. Return the function that replaces the drawn values by others (sites,)."""
+    """Draw a coordinate on a graph. Return a function that replaces the drawn values by new ones, (sites,)."""
     values = run.column(name)
     picture = draw_sites(axes, run.parameters["bonds"], positions, values[0], shades_of(values))
     axes.set_title(name)
@@ -88,7 +88,10 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
 
 
 def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
-    """Draw a coordinate (frames, *sizes) of a chain or plane. Return the function that draws another frame instead."""
+    """Draw the first frame of a coordinate of a chain or plane. Return a function that draws another frame instead.
+
+    ``values`` (frames, *sizes) has all frames.
+    """
     first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:

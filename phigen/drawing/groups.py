@@ -13,8 +13,8 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
 
     Up to three coordinates are one group. Otherwise each position is paired with its momentum, by names such as q and
     p, q1 and p1, x and px. If there are exactly two pairs, the two positions form one group, which shows the orbit in a
-    plane, and the two momenta form another. If not all coordinates belong to pairs, neighbours with the same letters or
-    the same number form a group.
+    plane. The two momenta then form another group. If not all coordinates belong to pairs, successive names form a
+    group if they have the same letters, or if they have the same number.
     """
     names = tuple(coordinates)
     if len(names) <= 3:
@@ -28,7 +28,10 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
 
 
 def phase_planes(coordinates: Sequence[str]) -> list[Group]:
-    """Return the planes of Poincaré sections: pairs of a position and its momentum, or else `groups`."""
+    """Return the planes of Poincaré sections: pairs of a position and its momentum, if all coordinates form pairs.
+
+    Otherwise the planes are `groups`.
+    """
     pairs = _pairs(tuple(coordinates))
     return pairs if len(coordinates) > 3 and 2 * len(pairs) == len(coordinates) else groups(coordinates)
 
@@ -48,7 +51,7 @@ def _momentum(q: str, names: Group) -> str | None:
 
 
 def _runs(names: Group) -> list[Group]:
-    """Return groups of neighbouring names with equal letters, or with equal numbers, whichever gives fewer groups."""
+    """Return groups of successive names that have equal letters, or equal numbers, whichever gives fewer groups."""
     by_letters = _split(names, lambda name: re.sub(r"[\d_]+$", "", name))
     by_number = _split(names, lambda name: name[len(re.sub(r"\d+$", "", name)) :])
     return min(by_number, by_letters, key=len)
@@ -65,10 +68,10 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 
 
 def _parts(run: Group) -> list[Group]:
-    """Return the groups of two or three names into which a long group is split.
+    """Split a long group into groups of two or three names.
 
     The groups have three names if the long group begins with x, y, z or if its length is divisible by 3. Otherwise they
-    have two names, but the first group has three if the length is odd.
+    have two names, except that the first group has three if the length is odd.
     """
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]

@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 
     from phigen.study.lyapunov import Spectrum
 
-#: Largest number of coordinates that get a panel; largest number of times in a diagram; number of snapshots in a row.
+#: MOST_PANELS: largest number of coordinates that get a panel. MOST_TIMES: largest number of times in a diagram.
+#: SNAPSHOTS: number of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Largest number of sites of a graph that is drawn with its bonds. It is drawn at several times, so that figures of
-#: larger graphs would be too large as files.
+#: Graphs with more sites are not drawn with their bonds. A graph is drawn at several times, so figures of larger graphs
+#: would be too large as files.
 MOST_DRAWN = 100
 #: Number of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48
@@ -101,7 +102,7 @@ def lattice_figure(
 
 @styled
 def series_figure(run: LatticeSeries, title: str) -> Figure:
-    """Return a figure of the quantities that a run has recorded over time instead of its states."""
+    """Return a figure of the quantities that a run has recorded over time. Such a run records no states."""
     from matplotlib.figure import Figure
 
     names = [*run.columns][: 2 * MOST_PANELS]
@@ -184,7 +185,7 @@ def _draw_diagram(
 
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
-    """Return the indices of at most ``dots`` frames at about equal intervals of time."""
+    """Return the indices of at most ``dots`` frames, which are at about equal intervals of time."""
     apart = np.diff(run.t[:-1])  # the last interval is left out, since it may be shorter
     if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
         return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
@@ -244,7 +245,7 @@ def _snapshots(run: LatticeTrajectory) -> Any:
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
     """Draw one coordinate of a plane at several times.
 
-    Of a three-dimensional lattice, the plane in the middle of the first axis is drawn.
+    If the lattice has three dimensions, the plane in the middle of the first axis is drawn.
     """
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]

@@ -1,6 +1,6 @@
 """Symplectic leaf in space: the surface on which a Casimir is constant.
 
-It is drawn as a net of the curves in which it meets planes.
+The surface is drawn as a net of curves. Each curve is the intersection of the surface with a plane.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ import numpy as np
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
-#: Number of planes perpendicular to each axis. Number of grid points along a side of a plane. Number of Newton steps
-#: that move the points of a line onto the surface.
+#: CUTS: number of planes perpendicular to each axis. GRID: number of grid points along a side of a plane. NEWTON_STEPS:
+#: number of Newton steps that move the points of a line onto the surface.
 CUTS, GRID, NEWTON_STEPS = 9, 41, 8
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """Surface ``casimir`` = ``level`` over three ``names``; ``parameters`` has the values of all other symbols."""
+    """Surface on which the function ``casimir`` of three coordinates has the value ``level``.
+
+    ``names`` are the names of the coordinates; ``parameters`` has the values of all other symbols.
+    """
 
     casimir: Expression
     names: tuple[str, ...]
@@ -28,7 +31,7 @@ class Leaf:
     level: float
 
     def value_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
-        """Return the values of C − level (…) and of ∇C (…, 3) at points (…, 3)."""
+        """Return the values of ``casimir`` − ``level`` (…) and of its gradient (…, 3) at points (…, 3)."""
         values = {**self.parameters, **{name: points[..., i] for i, name in enumerate(self.names)}}
         arrays = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
         value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in arrays)
@@ -55,7 +58,7 @@ def leaf_of(
 
 
 def around(leaf: Leaf, box: Floats) -> Floats:
-    """Return the box (2, 3) of lower and upper bounds, enlarged so that it contains the whole leaf.
+    """Return a box (2, 3) of lower and upper bounds that contains ``box`` and the whole leaf.
 
     The box is returned unchanged if the leaf is not a closed surface, or if the leaf is much larger than the box.
     """
@@ -83,7 +86,9 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
 
 
 def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
-    """Return the lines in which the leaf meets the plane x_axis = ``level``, linearly interpolated on a grid."""
+    """Return the lines in which the leaf meets the plane x_axis = ``level``. They are found by linear interpolation on
+    a grid.
+    """
     from contourpy import contour_generator
 
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
@@ -98,7 +103,7 @@ def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Float
     """Return the line (points, 3), moved onto the surface C = level by Newton steps.
 
     The points stay in the plane of the line, which is perpendicular to ``axis``. Points at which Newton's method fails,
-    for instance at a pole of C, are left out. Therefore several lines may result.
+    for instance at a pole of C, are left out. There the line is cut, so the result may be several lines.
     """
     points = line.copy()
     with np.errstate(all="ignore"):

@@ -1,6 +1,6 @@
 """Ticks and axis names of panels in space.
 
-matplotlib only estimates where they have room; here they are placed by the measured sizes of texts.
+matplotlib only estimates the room for ticks and names. This module places them by the measured sizes of their texts.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ CORNER = 0.08
 #: LETTERS: number of characters of a tick label that fit beside the vertical axis. WIDTH: width of each further
 #: character in points.
 LETTERS, WIDTH = 4, 2.2
-#: PAD: distance in points by which a name is moved at once. MOST_MOVES: largest number of moves. GAP: least distance
+#: PAD: distance in points of one move of a name. MOST_MOVES: largest number of moves of a name. GAP: least distance
 #: between texts in pixels.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -39,7 +39,7 @@ PALETTE: Mapping[str, str] = {
 DARK: Mapping[str, str] = {"paper": "#0d1117", "ink": "#e6edf3", "muted": "#9198a1", "grid": "#30363d"}
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
-#: Command that installs what figures need. It is valid in a checkout and for any release.
+#: Command that installs what figures need. It does not depend on how phigen was installed.
 INSTALLED_BY = "pip install matplotlib"
 
 #: Suffixes of files for figures.

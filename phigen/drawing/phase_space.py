@@ -45,7 +45,7 @@ def grid(coordinates: tuple[str, ...]) -> tuple[int, int]:
 
 
 def height(coordinates: tuple[str, ...]) -> float:
-    """Return the height of all panels in inches."""
+    """Return the height of all panels together, in inches."""
     rows, columns = grid(coordinates)
     return rows * (4.4 if len(coordinates) == 3 else 3.4 if columns < 3 else 2.4)
 
@@ -87,7 +87,7 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
     """Draw a curve (rows, 3) with a dot at its first point, and the net of its leaf.
 
-    The net, and a curve that is not long, are paler towards the back.
+    The net is paler towards the back. So is the curve, unless it is long.
     """
     box = around(leaf, box_of(points)) if leaf else box_of(points)
     # All axes have the same scale, unless a coordinate would become too flat.
@@ -144,7 +144,7 @@ def _draw_faded(
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
-        # A band also contains the point that follows its last point, so that neighbouring bands join.
+        # A band also contains the point that follows its last point, since otherwise there would be gaps between bands.
         in_band = band == level
         band_rows = in_band | np.r_[False, in_band[:-1]] if as_curve else in_band
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
@@ -204,8 +204,8 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 def box_of(points: Floats) -> Floats:
     """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
 
-    A direction in which the points extend little is widened, unless the values in this direction are so small that its
-    axis has a scale of its own.
+    The bounds are widened in directions in which the points extend little. They are not widened if the values in a
+    direction are so small that its axis has a scale of its own.
     """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
@@ -217,6 +217,6 @@ def box_of(points: Floats) -> Floats:
 
 
 def _length(points: Floats) -> float:
-    """Return the arc length of a curve whose coordinates are first scaled so that the range of each is 1."""
+    """Return the arc length of a curve. Its coordinates are first scaled, so that the range of each coordinate is 1."""
     size = np.ptp(points, axis=0)
     return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

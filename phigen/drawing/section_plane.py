@@ -13,21 +13,20 @@ from phigen.drawing.groups import phase_planes
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: The section counts as fixing a coordinate if the coordinate varies by less than this fraction of the largest
-#: variation.
+#: A coordinate counts as constant on the section if it varies by less than this fraction of the largest variation.
 _CONSTANT = 1e-8
 
 
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
-    The columns belong to the first pair of conjugate coordinates that both vary, if there is one.
+    They are a pair of conjugate coordinates that both vary, if there is one.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, is_constant in zip(names, constant, strict=True) if not is_constant]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
-    # A closed orbit may cross the surface always at the same point; then all coordinates are constant. The surface
+    # A closed orbit may always cross the surface at the same point. Then all coordinates are constant. The surface
     # probably fixes a coordinate to 0, so the coordinates with the largest values are drawn.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     by_size = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])

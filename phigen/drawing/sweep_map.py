@@ -15,7 +15,7 @@ from phigen.spec.names import KEPT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Results that are drawn if a sweep has no observables; the first that the store has is taken.
+#: If a sweep has no observables, the first of these results that is in the store is drawn.
 _PREFERRED_RESULTS = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
 #: A scale is logarithmic if the ratio of the largest to the smallest value exceeds this number.
@@ -31,8 +31,9 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 def draw(store: Path, path: Path, requested: str | None = None, origin: str = "") -> None:
     """Draw the variable ``requested`` of a store into a file.
 
-    By default all observables are drawn, or else the first of `_PREFERRED_RESULTS` in the store. The metadata of the
-    file contain the text ``origin``. Raises `FileError` if the store has no such variable.
+    By default the observables and their means are drawn. If there are none, the first of `_PREFERRED_RESULTS` in the
+    store is drawn. The metadata of the file contain the text ``origin``. Raises `FileError` if the store has no such
+    variable.
     """
     import xarray
 
@@ -57,7 +58,7 @@ def draw(store: Path, path: Path, requested: str | None = None, origin: str = ""
 
 @styled
 def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[str]) -> Figure:
-    """Return a figure with a panel for each variable; states have a panel for each coordinate.
+    """Return a figure with a panel for each variable. If the variable is a state, each coordinate has a panel.
 
     If the settings of the members do not form a grid, ``varied`` has the names of the quantities in which members
     differ.
@@ -104,11 +105,11 @@ def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
     """Draw values as curves or as a map; return a note for the title.
 
-    Observables are drawn as curves over one dimension; a second dimension with few values gives several curves. If
-    members differ in their random numbers (dimension ``seed``), the means over these members are drawn with their
-    standard errors. Other variables over two dimensions, and observables that would need more curves, are drawn as
-    maps. If there are more dimensions, the median over them is drawn. The note says what the error bars are, and over
-    which dimensions means or medians were taken.
+    Observables are drawn as curves over one dimension. If there is a second dimension with few values, there is a curve
+    for each value. If members differ in their random numbers (dimension ``seed``), the means over these members are
+    drawn with their standard errors. Other variables over two dimensions are drawn as maps, and so are observables that
+    would need more curves. If there are more than two dimensions, the median over the others is drawn. The note
+    explains the error bars, and names the dimensions over which means or medians were taken.
     """
     note = " ± standard error" if errors is not None else ""
     if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
@@ -191,7 +192,7 @@ def _colours(panel: Any) -> dict[str, Any]:
 
 
 def _positive(panel: Any) -> Any:
-    """Return the values that are finite and not 0, if all of them are positive; else an empty array."""
+    """Return the values that are finite and not 0. If one of them is negative, return an empty array."""
     values = np.asarray(panel)
     finite = values[np.isfinite(values) & (values != 0)]
     return finite if finite.size and finite.min() > 0 else finite[:0]

@@ -19,7 +19,7 @@ _MARKERS = "osD^vX"
 def draw_tuning(axes: Any, tuning: Tuning) -> None:
     """Draw a curve for each setting: the best settings in colour, classical methods dark, the others pale.
 
-    A star marks the step that is proposed for one of the best settings, or for a classical method.
+    A star marks a proposed step. Steps are proposed for the best settings and for classical methods.
     """
     coloured = [f.curve for f in (*tuning.finalists, *tuning.peers)]
     pale = [c for c in tuning.curves if c not in coloured and c.points]

@@ -1,6 +1,4 @@
-"""Comparison of two Poisson maps: a map in the paper, which changes the symplectic leaf, and the step of phigen, which
-does not.
-"""
+"""Comparison of two Poisson maps. A map in the paper changes the symplectic leaf; the step of phigen does not."""
 
 from __future__ import annotations
 
@@ -24,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, START = "poisson_not_hamiltonian", (1.0, 1.0, 2.0)
-#: K is the exponent k in `printed_map`. PAPER_STEP is the step size in the paper. STEP is a larger step size, with
-#: which the change of the leaf is visible after TURNS periods of the orbit.
+#: K: exponent k in `printed_map`. PAPER_STEP: step size in the paper. STEP: larger step size, with which the change of
+#: the leaf is visible after TURNS periods of the orbit.
 K, PAPER_STEP, STEP, TURNS = 2, 1e-4, 0.05, 3
 PERIOD, ELSEWHERE = 2 * math.pi, (1.0, 2.0, 4.0)
 

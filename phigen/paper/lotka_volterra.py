@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: Labels of the curves. OWN: for methods of phigen, with their orders. CLASSICAL: for classical methods, with their
-#: names in phigen. PHI is the label of the method of the paper.
+#: Labels of the curves. OWN: labels of methods of phigen, with their orders. CLASSICAL: labels of classical methods,
+#: with their names in phigen. PHI: label of the method of the paper.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"

@@ -1,4 +1,4 @@
-"""Redrawn figure of the paper, with measured numbers to compare with those of the paper."""
+"""Redrawn figure of the paper, with measured numbers. They can be compared with the numbers of the paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """Measured number, and a paraphrase of what the paper says about it."""
+    """A measured number, with a paraphrase of what the paper says about it."""
 
     quantity: str
     paper: str
@@ -51,8 +51,9 @@ def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[C
 
 
 def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Mapping[str, float]) -> Trajectory:
-    """Return a trajectory with energies and Casimirs, from states (rows, DIM) of a classical method at times
-    (rows,).
+    """Return the trajectory of a classical method, with energies and Casimirs.
+
+    ``x`` (rows, DIM) are the states at the times ``t`` (rows,).
     """
     backend, names = solver.backend, solver.interface
     energy, values = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: LONG: number of steps of the long run. EARLY: number of steps of the short runs, from which the first numbers come.
+#: LONG: number of steps of the long run. EARLY: number of steps of shorter runs, in which numbers are measured too.
 #: ROWS: number of rows that each run stores.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 #: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
@@ -50,7 +50,7 @@ class Bodies:
 
 
 def bodies() -> Bodies:
-    """Return the solvers of the figures, with their data.
+    """Return the two solvers of the figures, with the initial state, step size and parameters of the run.
 
     One solver is the method PHI-2 of the paper. The other has order 4 and the bi-realisation that phigen chooses.
     """

@@ -1,6 +1,4 @@
-"""Runs of classical methods in compiled C, which are advanced step by step: long runs, and runs for Poincaré
-sections.
-"""
+"""Step-by-step runs of classical methods in compiled C, for long runs and for Poincaré sections."""
 
 from __future__ import annotations
 
@@ -17,8 +15,7 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass
 class ClassicalCourse:
-    """Run of a classical method that is continued step by step, with the interface of
-    `phigen.runtime.session.Course`.
+    """Run of a classical method that is continued step by step, with the interface of `phigen.runtime.session.Course`.
 
     The compiled function ``runner`` makes the steps. It reads its initial state from the array ``place``. ``x`` is the
     state after ``steps`` steps.

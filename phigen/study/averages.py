@@ -22,8 +22,8 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
-#: Least length of blocks for a reliable error, in correlation times τ. The variance of the mean is estimated from
-#: blocks; with blocks of length L the estimate is 1 − τ/L times the true variance. At this length it is 10 % too small.
+#: Least length of blocks for a reliable standard error, in correlation times τ. An estimate from blocks of length L is
+#: 1 − τ/L times the true variance of the mean. With blocks of this least length, the estimate is 10 % too small.
 LEAST_LENGTH = 10.0
 #: An observable counts as conserved, up to the error of the method, if its values differ by less than this fraction of
 #: their size. Then its mean counts as resolved, whatever the length of the blocks.
@@ -36,8 +36,8 @@ class Average:
 
     ``error`` is the standard error of the mean, NaN if there are fewer than two blocks. ``correlation_time`` is the
     integrated autocorrelation time in the time unit of the run. Error and correlation time are estimated from blocks.
-    ``resolved`` says that the blocks are much longer than the correlation time; otherwise the error and the correlation
-    time are too small.
+    ``resolved`` says that the blocks are much longer than the correlation time. If the blocks are shorter, the
+    estimates of the error and of the correlation time are too small.
     """
 
     mean: float
@@ -52,8 +52,9 @@ class Average:
 class Averages:
     """Running averages of ``width`` observables; ``state`` has all intermediate results, as arrays that can be saved.
 
-    Rows before the time ``after`` are left out; in a run backwards in time, rows after it. The standard errors come
-    from at least ``blocks`` and fewer than 2·``blocks`` blocks, as soon as there are ``blocks`` rows.
+    Rows before the time ``after`` are left out. In a run backwards in time, rows with larger times are left out.
+    Standard errors come from blocks of rows. As soon as there are ``blocks`` rows, the number of blocks is at least
+    ``blocks`` and less than 2·``blocks``.
     """
 
     def __init__(
@@ -154,9 +155,9 @@ def averages(
 ) -> dict[str, Average]:
     """Return the time averages of the observables of a trajectory, or of the columns of a series, by name.
 
-    Rows from the time ``after`` on are averaged; standard errors come from at least ``blocks`` blocks. A trajectory
-    does not contain the setting ``average:`` of its run. To obtain the numbers of ``phigen run`` and of sweeps, pass
-    the values of ``after`` and ``blocks`` in that setting. Observables of lattices with a value at each site are left
+    Rows from the time ``after`` on are averaged. Standard errors come from at least ``blocks`` blocks. ``phigen run``
+    and sweeps take ``after`` and ``blocks`` from the setting ``average:`` of a run. A trajectory does not contain this
+    setting, so pass its values to obtain the same numbers. Observables of lattices with a value at each site are left
     out.
     """
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables

@@ -24,8 +24,8 @@ from phigen.symbolic.expression import Expression
 
 #: Number of corrections of the modified Hamiltonian, and largest order of a method for which corrections are computed.
 CORRECTIONS, MOST_ORDER = 2, 6
-#: STEPS: number of steps at the largest step size. DOUBLINGS: how often the step of the run is doubled to find that
-#: size. HALVINGS: how often it is then halved for the measurement.
+#: STEPS: number of steps at the largest step size. DOUBLINGS: largest number of times that the step of the run is
+#: doubled to find the largest step size. HALVINGS: number of times that this size is then halved for the measurement.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
 #: ROUNDING: changes of H̃ below this fraction of the largest term of H are rounding errors. ASYMPTOTIC: if H changes by
 #: more than this, in units of the energy, the steps are too large to determine an order.
@@ -40,8 +40,8 @@ class NotOfferedError(ValueError):
 class ModifiedHamiltonian:
     """Modified Hamiltonian H̃ = Σ h^j terms[j]; ``values`` has the values of all symbols except the coordinates.
 
-    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, from which the unit of the
-    errors follows.
+    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, which determines the unit of the
+    errors.
     """
 
     terms: tuple[Expression, ...]
@@ -96,8 +96,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # With numbers for the parameters the terms are shorter. If the series cannot represent roots of these numbers, it
-    # is computed with symbols.
+    # The terms are shorter if the parameters are numbers. If the series cannot represent roots of these numbers, the
+    # terms are computed with symbols instead.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for exact_values in (exact, {}):
@@ -123,7 +123,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
     """Return the powers of the step size with which the changes of H̃ with 0, 1, … corrections decrease.
 
-    The step ``h`` of the run is doubled until the changes exceed rounding errors; a power is infinite if they never do.
+    The step ``h`` of the run is doubled until the changes exceed rounding errors. If the changes never do, the power is
+    infinite.
     """
     observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -201,5 +202,5 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
 
 
 def truncation(m: int) -> str:
-    """Return words for H̃ with m corrections: "H itself" for m = 0, else "H̃ with 1 correction" and so on."""
+    """Return the name of H̃ with m corrections: "H itself" for m = 0, else "H̃ with 1 correction" and so on."""
     return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"

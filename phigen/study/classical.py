@@ -1,4 +1,4 @@
-"""Classical one-step methods of fixed step size, with which solvers are compared. They use the vector field only."""
+"""Classical one-step methods of fixed step size, for comparison with solvers. The methods use the vector field only."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ COMPARED = ("rk4",)
 Field = Callable[[Floats], Floats]
 Step = Callable[[Field, Floats, float], Floats]
 
-#: Largest number of fixed-point iterations in a step of the implicit midpoint rule. Each multiplies the error by O(h).
+#: Largest number of fixed-point iterations in a step of the implicit midpoint rule. Each iteration multiplies the error
+#: by O(h).
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
-#: Number of steps after which a long run yields its rows so far, so that the memory is bounded.
+#: A long run yields its rows in portions, each after this number of steps, so that the memory is bounded.
 _PIECE = 500
 
 
@@ -72,7 +73,7 @@ def _combination(stages: list[Floats], weights: Mapping[int, float]) -> Floats |
     return sum((w * stages[j] for j, w in weights.items()), 0.0)
 
 
-#: Step functions of the methods, with their orders, by the name of the method in a spec.
+#: The function that makes a step, and the order, for each method by its name in specs.
 METHODS: Mapping[str, tuple[Step, int]] = {
     "euler": (euler, 1),
     "rk2": (rk2, 2),
@@ -98,8 +99,7 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
 def pieces_of(
     method: str, field: Field, x0: Floats, h: float, rows: Iterable[float]
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the rows of a run in parts: arrays of step numbers (rows,), and of states (rows, DIM) at these
-    steps.
+    """Yield the rows of a run in parts: arrays of step numbers (rows,), and of states (rows, DIM) at these steps.
 
     ``rows`` are the requested step numbers, increasing, from 0 on. A number may have a fraction: then the state is
     computed by a shorter step from the last whole step, and the run continues from the whole step. If the method fails,

@@ -19,14 +19,14 @@ from phigen.symbolic.arrays import Floats
 #: Number of steps and stride of the runs. Rows are after 4, 8 and 11 steps: the reverse pass works in blocks of eight
 #: steps, so that one row lies inside a block, one at its end, and one after a shorter last stride.
 STEPS, STRIDE = 11, 4
-#: Number of times that the step of a run is halved if the run fails. The runs start from few sites of a lattice, or at
-#: the end of the user's run, where the step that suits the user's run may be too large.
+#: The step of a run is halved at most this number of times while the run fails. Runs start from few sites of a lattice,
+#: or at the end of the user's run. From these states the user's step size may be too large.
 HALVINGS = 6
 #: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to their
 #: terms. Both are exact up to rounding.
 TRANSPOSED = 1e-12
-#: Largest accepted difference between a gradient and finite differences of order 6, whose error is of this size. Below:
-#: the two displacements with which differences are computed, in units of the displaced quantity.
+#: Largest accepted difference between a gradient and finite differences of order 6. The errors of the finite
+#: differences are part of it. Below: the two displacements of the differences, in units of the displaced quantity.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
@@ -60,7 +60,7 @@ class GradedRun:
     bars: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Draw random cotangents ``bars`` of all rows, with a fixed seed, so that all targets get the same ones."""
+        """Draw random cotangents ``bars`` of all rows. All targets get the same ones, since the seed is fixed."""
         random_bars = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
         object.__setattr__(self, "bars", random_bars / self.units)
 
@@ -80,9 +80,9 @@ def possible_step(run: Callable[[float], object], h: float) -> float:
 def of_solver(
     solver: Solver, x: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> GradedRun:
-    """Return the run of a solver without lattice from ``x`` (DIM,) at the time ``t0``, with `STEPS` steps.
+    """Return the run of a solver without lattice from ``x`` (DIM,) at the time ``t0``.
 
-    Their size is h, or smaller if the run fails with h.
+    The run has `STEPS` steps. The step size is h, or smaller if the run fails with h.
     """
     begin = t0 if solver.interface.time else None
     h = possible_step(lambda size: solver.integrate(x, size, STEPS, STRIDE, t0=begin, parameters=parameters), h)
@@ -108,10 +108,10 @@ def of_solver(
 def of_lattice(
     solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
 ) -> GradedRun:
-    """Return the run of a lattice from ``x`` (coordinates, *sizes), with `STEPS` steps.
+    """Return the run of a lattice from ``x`` (coordinates, *sizes).
 
-    Their size is h, or smaller if the run fails with h. ``units`` are typical magnitudes of the numbers of ``x``, in
-    one dimension.
+    The run has `STEPS` steps. The step size is h, or smaller if the run fails with h. ``units`` are typical magnitudes
+    of the numbers of ``x``, in one dimension.
     """
     arguments: dict[str, Any] = {"t0": t0}
     h = possible_step(lambda size: solver.integrate(x, size, STEPS, STRIDE, parameters=parameters, **arguments), h)
@@ -167,10 +167,11 @@ def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> 
 
 
 def transposition_error(run: GradedRun) -> float:
-    """Return the largest difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩ for several tangent vectors v.
+    """Return the largest difference between ⟨w, DΦ v⟩ and ⟨DΦᵀ w, v⟩ for several tangent vectors v.
 
-    DΦ v comes from tangent maps, DΦᵀ bar from the gradient of the run. The difference is relative to the sum of the
-    absolute values of the terms of ⟨bar, DΦ v⟩. The v are all unit vectors or, for long states, random vectors.
+    Φ maps the initial state to the rows of the run, and w are the cotangents of the rows. Tangent maps give DΦ v, and
+    the gradient of the run is DΦᵀ w. The difference is relative to the sum of the absolute values of the terms of ⟨w,
+    DΦ v⟩. The v are all unit vectors or, for long states, random vectors.
     """
     count = len(run.x)
     vectors = run.units * (np.eye(count) if count <= _MOST_COLUMNS else _directions(count, _DIRECTIONS))
@@ -212,7 +213,7 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
     for name, bar in parameters_bar.items():
         value = np.asarray(run.parameters[name], dtype=np.float64)
         largest = float(np.max(np.abs(value), initial=0.0)) or 1.0
-        # Entries of an array may differ by powers of ten and must perhaps stay positive, so each is displaced in
+        # Entries of an array may differ by powers of ten, and may have to stay positive. So each entry is displaced in
         # proportion to its size.
         units = np.where(value != 0, np.abs(value), largest)
         v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
@@ -226,8 +227,7 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
 def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
     """Yield the derivative along a displacement by finite differences, once for each distance in `_DISTANCES`.
 
-    Differences are central, or one-sided if a run on the other side fails. A distance at which runs of the one-sided
-    difference fail as well is skipped.
+    Differences are central. If a run fails, they are one-sided. If a run fails again, the distance is skipped.
     """
     middle = run.rows(run.x, run.parameters)
     for apart in _DISTANCES:
@@ -243,9 +243,10 @@ def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
 def members_error(
     solver: Solver, states: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> float:
-    """Return the largest difference between gradients of an ensemble, run as one batch, and gradients of single runs.
+    """Return the largest difference between gradients of the members of an ensemble and gradients of single runs.
 
-    ``states`` (members, DIM) are the initial states. The difference is relative to the largest entry of the gradients.
+    ``states`` (members, DIM) are the initial states. The ensemble is run as one batch. The difference is relative to
+    the largest entry of the gradients.
     """
     arguments: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
     h = min((possible_step(partial(solver.integrate, x, steps=STEPS, **arguments), h) for x in states), key=abs)
@@ -261,7 +262,7 @@ def members_error(
 
 
 def _directions(size: int, count: int) -> Floats:
-    """Return random vectors (count, size), the same at every call."""
+    """Return random vectors (count, size). Every call returns the same vectors."""
     return np.random.default_rng(2).normal(size=(count, size))
 
 

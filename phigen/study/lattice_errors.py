@@ -18,8 +18,8 @@ from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Names of the three quantities that are reported for the energy: the energy if it is conserved; otherwise the energy
-#: minus the work done, or, if the work is not computed, the change of the energy.
+#: Names of the quantities that are reported for the energy. ENERGY: the energy, if it is conserved. BALANCE: otherwise
+#: the energy minus the work done. CHANGE: the change of the energy, if the work is not computed.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
 #: The work done along a run is integrated if the number of steps times the number of sites is at most this, because the
 #: integration repeats the run step by step.
@@ -29,9 +29,10 @@ MAX_BALANCED_SITE_STEPS = 20_000_000
 def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     """Return the deviations of energy, Casimirs and invariants from their initial values, by name, each (frames,).
 
-    Deviations of energy and invariants are in the units of `units_of`. Of a Casimir at every site, the largest change
-    at a site is returned. If H depends on the time, or forces act, the work done is subtracted from the energy, unless
-    the run is too long, continues an earlier run, has noise, or contains steps that were split because they failed.
+    Deviations of energy and invariants are in the units of `units_of`. For a Casimir at every site, the deviation is
+    the largest change at a site. If H depends on the time, or forces act, the work done is subtracted from the energy.
+    The work is not subtracted if the run is too long, continues an earlier run, has noise, or contains steps that were
+    split because they failed.
     """
     errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
@@ -65,9 +66,9 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
     """Return the work done up to each stored state (frames,), and an estimate of its error.
 
-    The run is repeated step by step, and the power is evaluated after every step. A polynomial through several values
-    of the power is integrated. Therefore further steps follow after the end of a run that is short, or whose last row
-    is inside a step. Raises `StepError` if a step fails before there are enough values.
+    The run is repeated step by step, and the power is evaluated after every step. The power is integrated as a
+    polynomial through several of its values. If a run is short, or its last row is inside a step, further steps are
+    made after its end to obtain enough values. Raises `StepError` if a step fails before there are enough values.
     """
     power, solver, start_time = Power(cell), run.solver, float(run.t[0])
     session, powers = solver.started(Beginning(run.x[0], run.h, run.parameters, start_time)), []
@@ -90,7 +91,7 @@ def _relative(values: Floats, unit: Unit) -> Floats:
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the sum of a density over the sites, and the sum over the sites of the absolute values of its terms."""
+    """Return the sum of a density over the sites, and the same sum with the absolute values of its terms."""
     sums = [_term(cell, term, x, parameters) for term in cell.additive_terms(density)]
     return float(sum(values.sum() for values in sums)), float(sum(np.abs(values).sum() for values in sums))
 

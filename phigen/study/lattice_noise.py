@@ -1,4 +1,4 @@
-"""Measurement of strong orders of steps of lattices with noise, which has an independent Wiener path for each site."""
+"""Measurement of the strong order of lattice solvers. The noise has an independent Wiener path for each site."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS, observed_power
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ZERO
 
-#: Number of steps along a path at the largest step size; smaller steps follow the same path.
+#: Number of steps along a Wiener path at the largest step size. Runs with smaller steps follow the same paths.
 STEPS = 2
 
 
@@ -48,7 +48,7 @@ def strong_order(
     finest = STEPS << (LEVELS + BEYOND)
     random, errors, size = np.random.default_rng(SEED), np.zeros(LEVELS), 0.0
     for _ in range(paths):
-        # The path is given by its increments over equal times: one for each part of each step of the finest size.
+        # The path consists of increments over equal times. A step of the finest size uses `parts` of them.
         deviation = np.sqrt(abs(h) * STEPS / finest / parts)
         path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * deviation
         end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
@@ -66,9 +66,9 @@ def strong_order(
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
-    """Return the number of steps that fail, among `SIGNS` steps from a state with the largest possible increments.
+    """Return the number of failed steps with the largest possible increments of the noise.
 
-    The signs of the increments are random.
+    `SIGNS` steps are made from the state ``x0``. The signs of the increments are random.
     """
     solver, noise = lattice_solver_of(compilation, "numpy"), compilation.program.noise
     assert noise is not None
@@ -85,7 +85,10 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """Return a solver of the lattice. Its vector field is σ π∇g, the term of the noise source ``name``."""
+    """Return a solver of the lattice whose vector field is that of the noise source ``name``.
+
+    The vector field is σ π∇g, where σ is the amplitude and g the Hamiltonian of the source.
+    """
     source = spec.noise[name]
     quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)
     quiet = replace(quiet, casimirs={}, invariants={}, runs={}, terms=None, composition="auto", scheme="auto")
@@ -104,10 +107,11 @@ def _along_lines(
     path: Floats,
     parts: int,
 ) -> Floats:
-    """Return the state at the end of a piecewise linear path from ``x``, by one RK4 step of size h for each piece.
+    """Return the final state of a solution that begins at ``x`` and follows a piecewise linear Wiener path.
 
-    ``path`` has the increments (steps·parts, sources, *sizes). The increment of a step is the sum of ``parts`` of
-    these. The drift is the vector field of ``solver``; ``sources`` have the fields σ π∇g.
+    The solution is computed by RK4 steps of size h. ``path`` has increments of shape (steps·parts, sources, *sizes),
+    and the increment of a step is the sum of ``parts`` of them. The drift is the vector field of ``solver``. The vector
+    fields of ``sources`` are multiplied by the increments.
     """
     drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
     begin = t0 or 0.0
@@ -142,5 +146,5 @@ def _slope(
 
 
 def _session(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None) -> Any:
-    """Return a session of a NumPy solver, which makes single steps, at the state ``x`` and the time ``t0``."""
+    """Return a session of a NumPy solver at the state ``x`` and the time ``t0``. Sessions make single steps."""
     return solver.started(Beginning(x, 1.0, solver.values(parameters, {}, x.shape[1:]), t0 or 0.0))

@@ -30,8 +30,8 @@ from phigen.study.methods import size_of
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification, order_limit
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Largest number of steps times sites of a run, without and with ``quick``; longer runs are shortened. FRAMES is the
-#: number of states of the run at which conserved quantities are evaluated.
+#: Largest product of the numbers of steps and sites of a run, without and with ``quick``. Longer runs are shortened.
+#: FRAMES is the number of states of the run at which conserved quantities are evaluated.
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
@@ -44,15 +44,16 @@ MOST_GRADED = 16384
 MAX_ROUNDING = 1e-11
 #: Number of sites along each axis in measurements of the strong order, for lattices with one, two and three axes.
 SOME = (32, 6, 4)
-#: Number of Wiener paths in measurements of the strong order, counted over all sites, with ``quick`` and without.
+#: Number of Wiener paths in measurements of the strong order: with ``quick``, and without. Each site of a lattice
+#: counts as one path.
 FEW_PATHS, MANY_PATHS = 32, 96
 #: Sentence on the errors of Casimirs, printed below the table of results.
-WORST_SITE = "The error of a Casimir at every site is that at the site where it changed most."
+WORST_SITE = "For a Casimir at every site, the error is that at the site where the Casimir changed most."
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """Subject of a verification: the compiled lattice, its solvers by target, and initial state and step of the run."""
+    """The compiled lattice that is verified, its solvers by target, and the start and step size of the run."""
 
     compilation: CompiledLattice
     solvers: Mapping[str, LatticeSolver]
@@ -218,10 +219,10 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Yield two checks of the energy or of the energy balance: of its largest error, and of its drift.
+    """Yield the checks of the energy or of the energy balance: of its largest error, and of its drift.
 
-    If ``errors`` only has the change of the energy, the single check reports the largest change, without a limit.
-    ``least`` is the relative error that rounding may cause.
+    If ``errors`` has only the change of the energy, there is one check, which reports the largest change without a
+    limit. ``least`` is the relative error that rounding may cause.
     """
     quantity = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
     energy = errors[quantity]
@@ -254,7 +255,10 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
 
 
 def _level_argument(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
-    """Return the argument that fixes the energy level e = −H(x) in steps of systems with a monitor; {} without one."""
+    """Return the argument that fixes the energy level e = −H(x) in steps of systems with a monitor.
+
+    The result is {} for systems without a monitor.
+    """
     return {"gauge": -solver.hamiltonian(x, parameters=parameters)} if solver.interface.monitored else {}
 
 
@@ -273,7 +277,7 @@ def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Che
 
 
 def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the checks of the solver in single precision: of single steps, and of Casimirs along a run."""
+    """Yield the checks of the solver in single precision: single steps, and Casimirs along a run."""
     single = replace(subject, solvers={"c": solver})
     worst = single_precision.farthest(single.stepped, subject.stepped, [trajectory.x[0], trajectory.x[-1]], subject.h)
     limit = single_precision.ONE_STEP
@@ -320,9 +324,9 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
 def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
     """Yield two checks on a lattice of a few sites: of the Poisson identity DΦ π DΦᵀ = π∘Φ, and of the tangent maps DΦ.
 
-    Each target computes its own DΦ. The error of the identity is the largest entry of DΦ π DΦᵀ − π∘Φ, divided by that
-    of |DΦ| |π| |DΦ|ᵀ; each field is measured in units of its typical magnitude. Tangent maps are compared with finite
-    differences. With forces a step is no Poisson map, and the identity is not checked.
+    Each target computes its own DΦ. The error of the identity is the largest entry of DΦ π DΦᵀ − π∘Φ, divided by the
+    largest entry of |DΦ| |π| |DΦ|ᵀ. For this, each field is measured in units of its typical magnitude. Tangent maps
+    are compared with finite differences. If forces act, a step is no Poisson map, and the identity is not checked.
     """
     interface, sizes = subject.solver.interface, _few_sizes(subject)
     expansion, site_count = expand(cell, sizes, ring(sizes[0]) if interface.graph else ()), int(np.prod(sizes))
@@ -337,8 +341,9 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"DΦ π DΦᵀ differs from π∘Φ by {defect:.1e}")
-    # Finite differences are computed four times: with two displacements, each in units of fields and in units of values
-    # at sites. The smallest deviation counts, since the larger ones are errors of the differences.
+    # Finite differences are computed four times: with two displacements, each in two units. The units are typical
+    # values of the fields, and typical values at the sites. The smallest of the four deviations counts, since larger
+    # ones are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
@@ -395,7 +400,11 @@ def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
 
 @dataclass(frozen=True)
 class _SmallLattice:
-    """Lattice of a few sites: its expansion to an ordinary system (``whole``), parameters, and initial state ``x``."""
+    """Lattice of a few sites, with parameters and the initial state ``x``.
+
+    ``whole`` is the ordinary system with the coordinates of all these sites. ``subject`` is the verification to which
+    the lattice belongs.
+    """
 
     whole: Expansion
     subject: _Subject
@@ -409,7 +418,7 @@ class _SmallLattice:
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held_level}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
-        """Return the state after a step, and the tangent map of the step as a matrix (numbers, numbers)."""
+        """Return the state after a step, and the tangent map of the step as a matrix over all numbers of a state."""
         count = self.x.size
         image, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
         return image, columns.reshape(count, count).T
@@ -417,7 +426,7 @@ class _SmallLattice:
     def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
         """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ of size h, relative to the terms in it.
 
-        The numbers of a state are measured in ``units`` (numbers,).
+        ``units`` has the unit in which each number of a state is measured.
         """
         after, slopes = self.tangent(solver, h)
         slopes = slopes * units / units[:, None]
@@ -430,8 +439,8 @@ class _SmallLattice:
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
         """Return the largest difference between the tangent map of a step and finite differences of order 6.
 
-        The difference is relative to the largest entry of the tangent map. Numbers of a state are measured in
-        ``units``, and displaced by ``apart``.
+        The difference is relative to the largest entry of the tangent map. Each number of a state is measured in its
+        entry of ``units``, and displaced by ``apart`` in this unit.
         """
 
         def step(y: Floats) -> Floats:
@@ -467,8 +476,9 @@ def _units(sizes: Floats) -> Floats:
 
 
 def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:
-    """Return the derivative of a function at y as a matrix, by central differences of order 6 at the distance
-    ``apart``.
+    """Return the derivative of a function at ``y`` as a matrix, by central differences of order 6.
+
+    The spacing of the differences is ``apart``.
     """
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     columns = []
@@ -481,10 +491,10 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 
 
 def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
-    """Return the numbers of random sites of the run, from which the sites of a small lattice are taken.
+    """Return the numbers of the sites of the run whose values a small lattice receives. They are drawn at random.
 
-    If all sites interact in pairs, the first site of the run is always among them, no site is taken twice, and their
-    order is that of the run: relative coordinates of bodies depend on the order, and the first body must have a mass.
+    If all sites interact in pairs, the first site is always drawn, since it must have a mass. Then no site is drawn
+    twice, and the sites are in the order of the run, since relative coordinates of bodies depend on the order.
     """
     sites, count = int(np.prod(start.sizes)), int(np.prod(sizes))
     if cell.relation == PAIRS:

@@ -21,7 +21,7 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: The exponents so far are recorded at step numbers that grow by this factor, eight times per doubling.
+#: The exponents are recorded after numbers of steps that grow by this factor: eight times while the number doubles.
 _SPACING = 2 ** (1 / 8)
 
 
@@ -29,8 +29,9 @@ _SPACING = 2 ** (1 / 8)
 class Spectrum:
     """Lyapunov exponents of a trajectory, in descending order, with the history of their convergence.
 
-    ``history`` (rows, exponents) has the exponents after the times ``times`` (rows,), which grow geometrically. They
-    are per unit of ``clock``, the variable in which steps have equal size: the time t, or τ for systems with a monitor.
+    ``history`` (rows, exponents) has the exponents after the times ``times`` (rows,), which grow geometrically.
+    Exponents are per unit of ``clock``, the variable in which steps have equal size: the time t, or τ for systems with
+    a monitor.
     """
 
     exponents: Floats
@@ -72,10 +73,10 @@ class Spectrum:
 
 
 class FrameGrowth:
-    """Growth of a frame of tangent vectors, step by step; ``state`` has all intermediate results, as arrays to be
-    saved.
+    """Growth of a frame of tangent vectors, step by step.
 
-    The initial frame consists of all unit vectors, or of the orthonormal columns of ``frame``.
+    The initial frame consists of all unit vectors, or of the orthonormal columns of ``frame``. ``state`` has all
+    intermediate results, as arrays that can be saved.
     """
 
     def __init__(self, dimension: int, h: float, frame: Floats | None = None) -> None:
@@ -100,7 +101,9 @@ class FrameGrowth:
         self.take(tangent @ self.frame)
 
     def take(self, propagated: Floats, steps: int = 1) -> None:
-        """Receive the columns of the frame after ``steps`` steps; add up their growth, and make them orthonormal."""
+        """Receive the frame after ``steps`` further steps: add up the growth of its columns, and orthonormalise
+        them.
+        """
         state = self.state
         state["frame"], r = np.linalg.qr(propagated)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))

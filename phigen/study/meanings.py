@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Meaning:
     """Explanation of the checks whose names begin with ``row``, for the table of results.
 
-    ``measures`` is the measured quantity, ``failure`` the cause if a check fails; "" if it has no limit.
+    ``measures`` is the measured quantity. ``failure`` is the cause if a check fails, "" for checks without a limit.
     """
 
     row: str
@@ -18,13 +18,13 @@ class Meaning:
 
 
 #: Cause of a failure for all checks that judge the drift of the energy.
-_DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for one to exist"
+_DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for such a Hamiltonian"
 
 MEANINGS = (
     Meaning(
         "observed order",
-        "the power p of h^p with which the error at a fixed time shrinks. The reference is DOP853 with small "
-        "steps. ∞: all errors are rounding",
+        "the power of the step size h with which the error at a fixed time shrinks. The reference is DOP853 with "
+        "small steps. ∞ means that all errors are rounding errors",
         "the terms S_1 … S_k, or the composition, do not have the stated order",
     ),
     Meaning(
@@ -68,16 +68,16 @@ MEANINGS = (
     ),
     Meaning(
         "energy: largest error",
-        "the largest error of H, relative to its value at the start. It depends on the step",
+        "the largest error of H, relative to the value of H at the start. The error depends on the step size",
     ),
     Meaning(
         "energy balance: largest error",
-        "the largest error of H minus the work done, for systems with a time or forces",
+        "the largest error of H minus the work done, if H depends on the time or forces act",
     ),
     Meaning(
         "energy: last/first window",
         "the largest energy error in the last tenth of the run, divided by that in the first tenth: about 1 if the "
-        "error oscillates, 10 if it drifts. Judged if the orbit stays in the region of its first half",
+        "error oscillates, 10 if it drifts. Judged if the coordinates keep the ranges of the first half of the run",
         _DRIFT,
     ),
     Meaning(
@@ -88,7 +88,8 @@ MEANINGS = (
     ),
     Meaning(
         "energy balance: last quarter/before",
-        "the same quotient for H minus the work done, if H of a lattice depends on the time or forces act",
+        "for H minus the work done, if H of a lattice depends on the time or forces act: the largest error in the "
+        "last quarter of the run, divided by that before",
     ),
     Meaning(
         "Poisson identity",
@@ -98,7 +99,8 @@ MEANINGS = (
     ),
     Meaning(
         "energy balance: last/first window",
-        "the same quotient for H minus the work done, if H depends on the time or forces act",
+        "for H minus the work done, if H depends on the time or forces act: the largest error in the last tenth of "
+        "the run, divided by that in the first tenth",
         _DRIFT,
     ),
     Meaning(
@@ -110,20 +112,21 @@ MEANINGS = (
     ),
     Meaning(
         "tangent map",
-        "the difference between the derivative of a step as the code computes it and differences of order six of "
-        "the step, which are accurate to 10⁻¹²",
+        "the difference between the derivative of a step as the code computes it and finite differences of order "
+        "six, which are accurate to 10⁻¹²",
         "the computed derivative is wrong, and so are the Poisson defect and Lyapunov exponents, which use it",
     ),
     Meaning(
         "gradient against tangent maps",
-        "for code with gradients: the difference between ⟨w, DΦ v⟩ and ⟨DΦᵀ w, v⟩ over eleven steps, with a tangent "
-        "vector v at the start and cotangents w after every fourth step and at the end, relative to the terms",
+        "for code with gradients: the difference between ⟨w, DΦ v⟩ by tangent maps and ⟨DΦᵀ w, v⟩ by gradients, "
+        "relative to the terms. Φ is a run of eleven steps, v a tangent vector at the start, w the cotangents after "
+        "every fourth step and at the end",
         "the reverse pass is not the transpose of the steps",
     ),
     Meaning(
         "gradient against differences",
-        "the difference between the gradient of a run of eleven steps, by its start and each parameter, and "
-        "finite differences of order six",
+        "the difference between gradients and finite differences of order six, for a run of eleven steps. "
+        "Gradients are those with respect to the initial state and each parameter",
         "the gradients are wrong, and so are fits and optimisations that use them",
     ),
     Meaning(

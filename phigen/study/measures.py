@@ -13,20 +13,21 @@ from phigen.geometry.system import System
 from phigen.study.methods import Method, by_differences, size_of
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Relative rounding error of a few operations. Errors up to a few times this are not errors of the method.
+#: Relative rounding error of a few operations. Errors of this size, or a few times larger, do not come from the method.
 ROUNDING = 4e-16
 
 #: Finite differences are computed several times. The usual displacements are divided by each of these factors.
 DISTANCES = (1.0, 256.0)
-#: If finite differences deviate by more than this fraction of the largest derivative, they are also computed with
-#: displacements in proportion to each coordinate.
+#: The tangent map is also compared with finite differences whose displacements are in proportion to each coordinate, if
+#: all other differences deviate from it by more than this fraction of its largest entry.
 ROUGH = 1e-8
 
-#: Relative displacement of a coordinate, from which the effect of rounding errors of the state on π is estimated.
+#: Relative displacement of coordinates in finite differences of π. These differences estimate the effect of rounding
+#: errors of the state on π.
 _SHARE = 1e-6
 
-#: Numbers of steps for measurements of the order: 4, 6, 8, 12, 16, 24, … Since an order follows from the errors with n
-#: and 2n steps, the list contains 2n for every n except the last two.
+#: Numbers of steps for measurements of the order: 4, 6, 8, 12, 16, 24, … An order follows from the errors with n and 2n
+#: steps. So the list contains 2n for every n except the last two.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 
@@ -34,10 +35,10 @@ _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 class Observed:
     """Observed order of a method, with the errors from which it follows.
 
-    ``order`` is log₂(error with step h/error with step h/2), the median for the three smallest steps in the asymptotic
-    range; NaN if no steps are in this range. ``pairs`` lists step sizes with errors relative to the solution, ``floor``
-    is the error of the reference solution or of rounding. ``exact`` says that all errors are so close to the floor that
-    no order can be observed.
+    ``order`` is the median of log₂(error with step h / error with step h/2) for the three smallest steps h in the
+    asymptotic range. It is NaN if no steps are in this range. ``pairs`` lists step sizes with errors relative to the
+    solution. ``floor`` is the error of the reference solution, or the rounding error if that is larger. ``exact`` says
+    that all errors are so close to the floor that no order can be observed.
     """
 
     order: float
@@ -72,7 +73,7 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
 
 
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
-    """Return the matrix π(x) at a state, (DIM, DIM)."""
+    """Return the matrix π(x), of shape (DIM, DIM), at the state ``x``."""
     values = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
     return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], values)]).reshape(
         (len(x),) * 2
@@ -82,8 +83,9 @@ def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
     """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ, relative to the largest entry of |DΦ| |π| |DΦ|ᵀ.
 
-    DΦ is computed by finite differences if the method has no tangent map. If terms of π nearly cancel, rounding errors
-    of the state limit the accuracy of π; then the defect is relative to Σ |x_i ∂_i π|.
+    DΦ is computed by finite differences if the method has no tangent map. Rounding errors of the state change π by
+    about Σ_i |x_i ∂_i π|, in units of the rounding error. If terms of π nearly cancel, this sum may be larger than |DΦ|
+    |π| |DΦ|ᵀ. Then the result is relative to the sum.
     """
     tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
     start_tensor, end_tensor = (poisson_matrix(system, parameters, state) for state in (x, image))
@@ -99,10 +101,11 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 
 
 def tangent_error(method: Method, x: Floats, h: float) -> float:
-    """Return the difference between the tangent map and finite differences of a step, relative to the largest entry.
+    """Return the largest difference between the tangent map and finite differences of a step.
 
-    Several displacements are tried, and the smallest difference is returned, since no displacement suits all cases:
-    near a singularity it must be small, and coordinates may differ widely in size.
+    The difference is relative to the largest entry of the tangent map. Several displacements are tried, and the
+    smallest difference is returned, since no displacement suits all cases: near a singularity it must be small, and
+    coordinates may differ widely in size. The result is 0 if the method has no tangent map.
     """
     if method.tangent is None:
         return 0.0

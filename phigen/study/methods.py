@@ -12,7 +12,8 @@ from phigen.runtime.solver import Solver
 from phigen.study import classical
 from phigen.symbolic.arrays import Floats
 
-#: Displacement for finite differences, relative to the state. With formulas of order 6 their error is about 1e-12.
+#: Displacement for finite differences, relative to the state. Finite differences of order 6 then have an error of about
+#: 1e-12.
 _WIDTH = 2e-3
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
@@ -61,7 +62,7 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
         lambda x, h, steps, stride: fixed_gauge.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
         lambda x, h: fixed_gauge.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
-        # With noise, members of an ensemble have different increments, so that they cannot replace single steps.
+        # With noise, members of an ensemble have different increments. So the ensemble cannot replace single steps.
         together if solver.target == "numpy" and not solver.interface.noise else None,
     )
 
@@ -122,7 +123,7 @@ def of_classical(
 
 
 def size_of(x: Floats) -> float:
-    """Return the largest absolute value of the entries of ``x``, to which errors are relative; 1 if all are 0."""
+    """Return the largest absolute value in ``x``, which is the unit of errors of a state; 1 if all entries are 0."""
     return float(np.max(np.abs(x))) or 1.0
 
 

@@ -1,4 +1,4 @@
-"""Motion of a system with a monitor in its time τ, with dt = g dτ: the reference for steps of equal size in τ."""
+"""Motion of a system with a monitor g in the time τ, where dt = g dτ: a reference for steps of equal size in τ."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[F
 
 
 def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
-    """Return the method of a solver whose states have the time t as last coordinate.
+    """Return the method of a solver with a monitor. In the states of the method, the time t is the last coordinate.
 
     ``gauge`` fixes the energy level e, so that all steps are the same map.
     """

@@ -23,17 +23,20 @@ ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
 #: Only the beginning of a run is studied, because errors may grow too fast in a long run. These numbers of steps are
 #: tried one after another, until the errors decrease with the step size as the order of the solver predicts.
 SPANS = (4096, 256, 16)
-#: The order is determined from errors between ABOVE_FLOOR times the error of the reference, and ASYMPTOTIC.
+#: An order is determined from errors that are smaller than ASYMPTOTIC, and larger than ABOVE_FLOOR times the error of
+#: the reference solution.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
-#: Smallest measurable error, and the error below which rounding may dominate, relative to the solution.
+#: ROUNDING: smallest measurable error. SMALL: error below which rounding may dominate. Errors are relative to the
+#: solution.
 ROUNDING, SMALL = 2.0**-52, 1e-6
 
 
 @dataclass(frozen=True)
 class PrecisionPoint:
-    """Result with one step size: relative errors of solution and Casimirs at the end of the run, and its time.
+    """Result with one step size: relative errors at the end of the run, and computing time.
 
-    ``seconds`` is the time of the fastest repetition; ``casimirs`` is the largest error of a Casimir.
+    ``error`` is the error of the solution, ``casimirs`` the largest error of a Casimir. ``seconds`` is the time of the
+    fastest repetition.
     """
 
     step: float
@@ -64,11 +67,12 @@ class PrecisionCurve:
 
 @dataclass(frozen=True)
 class Study:
-    """Results of all methods, one curve each, for the part of a run from 0 to ``time`` with ``steps`` steps.
+    """Results of all methods, one curve each.
 
-    ``clock`` is the variable of this time, t or τ. Errors below ``floor`` are errors of the ``reference`` solution.
-    ``set_up`` is the time in seconds that the solver needs once for each trajectory, which the times of the points do
-    not contain. All methods are written in ``language``; ``rounds`` is the number of repetitions.
+    The methods integrate from 0 to ``time``, which is the duration of ``steps`` steps of the run. ``clock`` is the
+    variable in which ``time`` is measured, t or τ. Errors below ``floor`` are errors of the ``reference`` solution. The
+    times of the points do not contain ``set_up``, the seconds that the solver needs once for each trajectory. All
+    methods are written in ``language``; ``rounds`` is the number of repetitions.
     """
 
     time: float
@@ -96,12 +100,12 @@ def study(
     casimirs: Callable[[Floats], float] | None = None,
     rounds: int = ROUNDS,
 ) -> Study:
-    """Run all methods of ``race`` with steps of size ``h``, with larger and with smaller steps, and measure the times.
+    """Run all methods of ``race`` with several step sizes, larger and smaller than ``h``, and measure the times.
 
-    The runs cover the beginning of a run of ``steps`` steps of size h. ``order`` is that of the solver. ``solution(t)``
-    is the closed form, if there is one; otherwise DOP853 provides the reference, with steps so small that halving them
-    no longer changes the result. ``casimirs(x)`` returns the largest error of a Casimir at a state. Raises
-    `ArithmeticError` if DOP853 cannot follow the solution.
+    The runs cover the beginning of a run of ``steps`` steps of size h. ``order`` is the order of the solver.
+    ``solution(t)`` is the closed form, if there is one. Otherwise DOP853 provides the reference solution, with steps so
+    small that halving them no longer changes the result. ``casimirs(x)`` returns the largest error of a Casimir at a
+    state. Raises `ArithmeticError` if DOP853 cannot follow the solution.
     """
     for span in sorted({min(steps, s) for s in SPANS}, reverse=True):
         target, floor = (solution(h * span), 4 * ROUNDING) if solution else _by_dop853(race, h * span, span)
@@ -131,13 +135,13 @@ def error_of(state: Floats, target: Floats) -> float:
 
 
 def slope(errors: Mapping[int, float], floor: float) -> float:
-    """Return the observed order, from the ``errors`` by number of steps.
+    """Return the observed order; ``errors`` maps numbers of steps to errors.
 
-    The order is log₂ of the quotient of the errors with n and 2n steps. Both errors must be in the asymptotic range:
-    they are neither rounding errors nor very large. The result is the median for the three largest n; NaN if no n has
-    two errors in this range.
+    The order is log₂ of the quotient of the errors with n and 2n steps. Both errors must be in the asymptotic range,
+    where they are neither rounding errors nor very large. The result is the median for the three largest n. It is NaN
+    if no n has two errors in this range.
     """
-    # If the error grows from one number of steps to the next, it is rounding error.
+    # An error that grows although the number of steps grows is a rounding error.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])
     usable = {n: e for n, e in errors.items() if ABOVE_FLOOR * floor < e < ASYMPTOTIC}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
@@ -169,8 +173,8 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
 def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: int) -> dict[tuple[str, int], float]:
     """Return the time of one run in seconds, for each method and number of steps (``counts``).
 
-    It is the minimum over the repetitions, in each of which all methods take turns. The key ("", 0) has the set-up
-    time.
+    Runs are repeated, and the shortest time is returned. In each repetition all methods take turns. The key ("", 0) has
+    the set-up time of the solver.
     """
     works: dict[tuple[str, int], Callable[[int], object]] = {("", 0): race.set_up}
     for label, run in race.runners.items():
@@ -191,8 +195,8 @@ def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: 
 def _by_dop853(race: Race, end: float, span: int) -> tuple[Floats, float]:
     """Return the solution at the time ``end`` by DOP853, and its estimated relative error.
 
-    The step is halved repeatedly; the estimate is the least difference between results with a step and half that step.
-    It is infinite if all runs fail.
+    The step is halved repeatedly. Results with a step and with half that step are compared; the least difference is the
+    estimate. The estimate is infinite if all runs fail.
     """
     best, last = (np.full(1, np.nan), math.inf), None
     for k in range(-2, FINER):

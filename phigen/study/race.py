@@ -26,8 +26,8 @@ from phigen.symbolic.arrays import Floats
 #: Label of the phigen solver among the methods.
 OWN = "phigen"
 
-#: Butcher tableaux of the explicit methods: the rows of the matrix after the first, which is 0, and the weights. Each
-#: maps the index of a stage to its coefficient.
+#: Butcher tableaux of the explicit methods, as pairs (rows of the matrix, weights). The first row is left out, since it
+#: is 0. Rows and weights map the index of a stage to its coefficient.
 TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]] = {
     "euler": ((), {0: 1.0}),
     "rk2": (({0: 0.5},), {1: 1.0}),
@@ -41,8 +41,9 @@ Runner = Callable[[float, int, int], Floats | None]
 
 @dataclass(frozen=True)
 class Race:
-    """Methods to compare: the functions that run them, by label, all written in ``language``, ``C`` or ``Python``.
+    """Methods to compare, as functions that run them.
 
+    ``runners`` has these functions by label. All of them are written in ``language``, which is ``C`` or ``Python``.
     ``set_up(n)`` repeats n times the work that the solver does once for each trajectory. ``clock`` is the variable in
     which steps have equal size, t or τ.
     """
@@ -58,8 +59,8 @@ def compiled(
 ) -> Race:
     """Return the functions that run the solver and the classical ``methods``, in C and double precision.
 
-    Methods that are implicit are left out. With a monitor, all methods make steps of equal size in τ. Raises
-    `ToolchainError` if the C cannot be compiled.
+    Implicit methods are left out. With a monitor, all methods make steps of equal size in τ. Raises `ToolchainError` if
+    the C cannot be compiled.
     """
     from phigen.targets.rendering import render
 

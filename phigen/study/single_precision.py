@@ -35,10 +35,10 @@ def measured(
     parameters: Mapping[str, float],
     t0: float,
 ) -> Iterator[Measured]:
-    """Yield the results of checks of single precision: of single steps, and of the Casimirs along a run.
+    """Yield the results of checks of a solver in single precision.
 
-    Steps of size h from ``states`` are compared with those in double precision. The run has ``steps`` steps from
-    ``start`` at the time ``t0``.
+    Steps of size h from ``states`` are compared with steps in double precision. The Casimirs are checked along a run
+    with ``steps`` steps from ``start`` at the time ``t0``.
     """
     apart = farthest(single.step, double.step, states, h)
     yield "single precision: a step against double precision", apart, ONE_STEP

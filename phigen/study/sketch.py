@@ -21,10 +21,10 @@ POINTS = 20_000
 
 
 class Thinned:
-    """Selection of at most ``max_rows`` rows from a sequence of rows: all, or every second, every fourth, …
+    """Selection of at most ``max_rows`` rows from a sequence of rows: all rows, or every second, every fourth, …
 
-    Whenever there are too many rows, every second one is dropped. So the selection depends only on the number of rows,
-    not on the portions in which they arrive. ``state`` has the rows and counts, as arrays that can be saved.
+    Whenever there are too many selected rows, every second one is dropped. So the selection depends only on the number
+    of rows, not on the portions in which they arrive. ``state`` has the rows and counts, as arrays that can be saved.
     """
 
     def __init__(self, width: int, max_rows: int) -> None:
@@ -58,9 +58,9 @@ class Thinned:
 class Sketch:
     """Selection of the rows of a run for its figures.
 
-    The rows are at equal intervals; in addition, for the energy and each Casimir, the row with the largest error in
-    each of `WINDOWS` equal parts of the run is stored. A stored row contains its number, t, x, energy, Casimirs and
-    observables. ``rows`` is the number of all rows of the run.
+    Rows at equal intervals are stored. In addition, the run is divided into `WINDOWS` equal parts. For each part, the
+    rows with the largest errors of the energy and of each Casimir are stored. A stored row contains its number, t, x,
+    energy, Casimirs and observables. ``rows`` is the number of all rows of the run.
     """
 
     def __init__(self, dimension: int, casimirs: int, rows: int, observables: int = 0) -> None:

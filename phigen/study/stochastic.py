@@ -1,4 +1,4 @@
-"""Measurements of steps with noise: their strong order, and failures with the largest increments."""
+"""Measurements of steps with noise: the strong order, and the number of steps that fail with the largest increments."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from phigen.symbolic.arrays import Floats
 #: PATHS: number of Wiener paths. LEVELS: number of step sizes h, h/2, h/4, …. BEYOND: number of further halvings for
 #: the reference solution. SEED: seed of the paths.
 PATHS, LEVELS, BEYOND, SEED = 48, 5, 2, 1
-#: Number of steps from one state with the largest increments; their signs are random.
+#: Number of steps that are tried from one state. Their increments of the noise have the largest possible size and
+#: random signs.
 SIGNS = 8
-#: Errors up to this fraction of the state are rounding errors, of steps and of the RK4 steps of reference solutions.
-#: Those of exact steps were 1e-16 to 1e-14.
+#: Errors up to this fraction of the state count as rounding errors of the steps and of the RK4 steps of the reference
+#: solution. Methods whose steps are exact had errors of 1e-16 to 1e-14.
 PATH_ROUNDING = 1e-12
 
 
@@ -53,7 +54,8 @@ def strong_order(
 
 
 def observed_power(errors: Floats, size: float) -> float:
-    """Return the power of the step size with which ``errors`` (LEVELS,) decrease; each step size is half of the last.
+    """Return the power of the step size with which ``errors`` (LEVELS,) decrease. Each step size is half of the one
+    before.
 
     The power is infinite if an error is 0, or if all errors are rounding errors of states of the given ``size``.
     """
@@ -65,9 +67,11 @@ def observed_power(errors: Floats, size: float) -> float:
 def _along_lines(
     solver: Solver, x: Floats, parameters: Mapping[str, float], t0: float, h: float, increments: Floats
 ) -> Floats:
-    """Return the last states (paths, DIM) of solutions that begin at ``x`` (paths, DIM) and are driven by noise that is
-    linear in each step of size h. One RK4 step is made for each such piece; ``increments`` (paths, steps, draws) are
-    those of the noise.
+    """Return the last states (paths, DIM) of solutions that begin at ``x`` (paths, DIM) and follow piecewise linear
+    Wiener paths.
+
+    Each path is linear during a step of size h, and one RK4 step advances the solution by this time. ``increments``
+    (paths, steps, draws) are the increments of the paths.
     """
     backend, timed = solver.backend, bool(solver.interface.time)
     sources = len(solver.interface.noise)
@@ -88,9 +92,9 @@ def _along_lines(
 
 
 def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
-    """Return the number of steps that fail, among `SIGNS` steps from each state with the largest possible increments.
+    """Return the number of failed steps with the largest possible increments of the noise.
 
-    The signs of the increments are random.
+    `SIGNS` steps are made from each of the ``states``. The signs of the increments are random.
     """
     draws, begin = solver.interface.draws, t0 if solver.interface.time else None
     random, failed = np.random.default_rng(SEED), 0

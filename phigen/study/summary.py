@@ -44,8 +44,7 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method in a run with ``rows`` rows. The first ``good`` rows are finite; only they are
-    evaluated.
+    """Errors of one method in a run with ``rows`` rows. The first ``good`` rows are finite; only they are evaluated.
 
     ``exact`` is the largest error against the closed form, None if there is none. If the method fails in its first
     step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H − work; ``work``
@@ -89,9 +88,9 @@ def summarise(
 
 
 class Watch:
-    """Running summary of the states of one method, whose memory does not grow with the number of states.
+    """Running summary of the states of one method. Its memory does not grow with the number of states.
 
-    ``rows`` is the number of rows that the run will have, from which the windows follow. ``state`` has all intermediate
+    ``rows`` is the number of rows that the run will have; it determines the windows. ``state`` has all intermediate
     results, as arrays that can be saved.
     """
 
@@ -120,7 +119,7 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
         self._powers = powers(system)
-        # instant: the last time, and at this time the power and its derivatives. work: the work so far, and its
+        # "instant": the last time, with the power and its derivatives at this time. "work": the work so far, and its
         # estimated error.
         if self._powers:
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
@@ -169,7 +168,7 @@ class Watch:
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
             with np.errstate(invalid="ignore"):  # no warning if the initial value is not finite: then errors are NaN
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
-        if self._powers:  # the work at the start is 0, so that state["start"] has the initial H
+        if self._powers:  # the work at the start is 0, so state["start"] has the initial H
             changes = self._units()[0].errors(energies, float(state["start"][0]))
             state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)
@@ -181,7 +180,7 @@ class Watch:
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
         """Return the work done from the start to each of the times ``t``, and add it to the state.
 
-        ``slopes`` are the power and its derivatives at these times, which follow the times of earlier calls.
+        ``slopes`` are the power and its derivatives at these times. The times are later than those of earlier calls.
         """
         state = self.state
         if not self.begun:
@@ -251,9 +250,10 @@ def _is_telling(turns: NDArray[np.int64]) -> bool:
 
 
 def _windows(rows: NDArray[np.int64], row_count: int) -> NDArray[np.int64]:
-    """Return the number of the window, from 0, of each row number in ``rows``; `WINDOWS` for the initial row 0.
+    """Return, for each row number in ``rows``, the number of the window that contains the row.
 
-    ``row_count`` is the number of all rows of the run.
+    Windows are numbered from 0. The initial row 0 is in no window, and gets the number `WINDOWS`. ``row_count`` is the
+    number of all rows of the run.
     """
     share, remainder = divmod(row_count - 1, WINDOWS)
     window_ends = np.cumsum([share + (k < remainder) for k in range(WINDOWS)])

@@ -30,19 +30,20 @@ from phigen.symbolic.expression import Expression
 
 #: An observed order may be smaller than the stated one by at most this.
 ORDER_SLACK = 0.3
-#: An observed strong order may be smaller than the stated one by at most this. It is measured on few paths.
+#: An observed strong order may be smaller than the stated one by at most this, since few paths are used.
 STRONG_SLACK = 0.2
-#: With its last correction, the modified Hamiltonian should be constant up to a higher power of h than without it. The
-#: observed power may be too small by at most this fraction of the increase.
+#: Each correction of the modified Hamiltonian should raise the power of h with which its changes decrease. The observed
+#: power may be too small by at most this fraction of the rise due to the last correction.
 MODIFIED_SLACK = 0.6
-#: Largest accepted error of exact properties of a step, relative to their terms: Poisson defect, reversibility,
-#: agreement of targets.
+#: Largest accepted error of the properties of a step that are exact up to rounding: Poisson defect, reversibility and
+#: agreement of targets. Errors are relative to the size of the compared values.
 ONE_STEP = 1e-13
-#: Largest accepted difference between the tangent map and finite differences of a step, whose error is of this size.
+#: Largest accepted difference between the tangent map and finite differences of a step. The errors of the finite
+#: differences are part of it.
 DIFFERENCES = 1e-7
-#: Largest accepted quotient of the largest energy errors in the last and in the first tenth of a run.
+#: Largest accepted ratio of the largest energy error in the last tenth of a run to that in the first tenth.
 GROWTH = 4.0
-#: Largest number of steps of a run, without and with --quick.
+#: Largest number of steps of a run: without the option --quick, and with it.
 MOST_STEPS, FEW_STEPS = 20_000, 2_000
 #: Number of states of the run from which single steps are checked.
 STATES = 4
@@ -196,7 +197,10 @@ def verify(
 
 
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
-    """Return the checks of all groups, by title; each group is shown as a stage of the progress display."""
+    """Run the groups of checks, and return all results.
+
+    ``groups`` maps titles to functions that make the checks. The progress display shows each group as a stage.
+    """
     results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:
         for title, checks in groups.items():
@@ -209,7 +213,7 @@ def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) ->
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
     """Return the constants that a solver chooses for the trajectory from x: multiples of Casimirs, or e = −H(x).
 
-    None if the solver has no such constants.
+    The result is None if the solver has no such constants.
     """
     if not compilation.program.held:
         return None
@@ -378,9 +382,10 @@ def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | No
 
 
 def _recurrent(rows: Floats) -> bool:
-    """Whether each coordinate stays, in the second half of a run, in its range of the first half, plus a margin.
+    """Whether each coordinate stays, up to a margin, in the range that it has in the first half of a run.
 
-    The margin is 20 % of the largest range. Only then can errors in the first and the last tenth be compared.
+    The margin is 20 % of the largest range. If a coordinate leaves its range, errors in the first and in the last tenth
+    of the run cannot be compared.
     """
     half_count = len(rows) // 2
     low, high = rows[:half_count].min(axis=0), rows[:half_count].max(axis=0)
@@ -424,10 +429,12 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
 
 
 def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of gradients of short runs: against tangent maps, against finite differences, and in batches.
+    """Yield the checks of gradients of short runs.
 
-    Multiples of Casimirs are held fixed, since gradients treat them as constants. In systems with a monitor, gradients
-    include the dependence of e = −H(x₀) on the initial state, but tangent maps treat e as a constant.
+    Gradients are compared with tangent maps and with finite differences. Gradients of an ensemble are compared with
+    those of single runs. Multiples of Casimirs are held fixed, since gradients treat them as constants. In systems with
+    a monitor, gradients include the dependence of e = −H(x₀) on the initial state, but tangent maps treat e as a
+    constant.
     """
     program = subject.compilation.program
     if not program.extras.adjoint:
@@ -451,7 +458,7 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """Return limit, verdict and reason of failure for the check of the Poisson defect of an approximate bi-realisation.
+    """Check the Poisson defect of an approximate bi-realisation; return limit, verdict, and reason for a failure.
 
     If the series of the bi-realisation ends at degree d in p, the defect must decrease like h^(d+1). ``largest`` is the
     largest measured defect.
@@ -504,10 +511,10 @@ def single_checks(
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
-    """Yield the checks that changes of H̃ with m corrections decrease like h^(p+m).
+    """Yield the checks of the modified Hamiltonian H̃ of the method, one for each number m of corrections.
 
-    H̃ is the modified Hamiltonian of the method, p its order. For symmetric methods the power is p + 2m. There are no
-    checks if H̃ is not available.
+    For a method of order p, changes of H̃ must decrease like h^(p+m), or like h^(p+2m) if the method is symmetric.
+    There are no checks if H̃ is not available.
     """
     try:
         series = backward.modified(subject.compilation, subject.parameters, gauge)
@@ -523,7 +530,10 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """Return the check of the largest step that succeeds from all ``states``, in units of the step of the run."""
+    """Return the check of the largest step size with which steps from all ``states`` succeed.
+
+    The step size is in units of the step size of the run.
+    """
     largest = measures.largest_step(subject.main, states, subject.h)
     return Check(
         "largest step that converges, in steps of the run", largest, "at least 1", largest >= 1, "the run's step fails"

@@ -133,9 +133,9 @@ def _run_of(
 
 
 def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fraction]:
-    """Return ``parameters``, the values of parameters that are the same for all members, as fractions.
+    """Return the values in ``parameters``, which are the same for all members, as fractions.
 
-    Raises `TypeError` or `ValueError` for wrong names or values, among them values that violate the bound of a
+    Raises `TypeError` or `ValueError` for wrong names or values, for instance for a value that violates the bound of a
     parameter.
     """
     arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
@@ -147,7 +147,7 @@ def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fracti
 
 
 def _numbers(sequence: Any, what: str) -> list[float]:
-    """Return a number or an array as a list of finite numbers; errors call the argument ``what``."""
+    """Return a number or an array as a list of finite numbers. Error messages use the name ``what`` for it."""
     return arguments.array(sequence, what, (len(sequence),) if np.ndim(sequence) else (1,)).tolist()  # type: ignore[no-any-return]
 
 
@@ -240,7 +240,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 
 
 def _draws(value: Mapping[str, Any]) -> Axis:
-    """Return the axis of the sweep along which random values are drawn anew, from ``seed: {count: n}``."""
+    """Return the axis ``seed`` for a mapping {count: n}. Random values are drawn anew for each of its n values."""
     if set(value) != {"count"}:
         raise ValueError(f"over: seed has a count, and no other key, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))

@@ -33,8 +33,8 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 def make(store: str, digest: str, number: int) -> tuple[int, int]:
     """Compute the members of a chunk, store their results, and return the numbers of members and of failed members.
 
-    ``digest`` identifies the content of the store. If this process has read another store at the same path before, it
-    notices the new digest, and reads the new store.
+    ``digest`` identifies the content of the store. It is compared with the digest of the store that this process has
+    read at the same path before. If they differ, the new store is read.
     """
     job, solver = _ready(store, digest)
     plan = job.plan
@@ -96,7 +96,8 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
     the sweep; each number selects a path of the noise.
     """
     plan, count = job.plan, len(numbers)
-    # A value that all members have in common gets the shape (), so that the solver computes coefficients of steps once.
+    # A value that all members have in common gets the shape (). Then the solver computes the coefficients of steps only
+    # once.
     parameters = {name: varied.get(name, np.asarray(value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
     h, t0 = varied.get("step", np.asarray(plan.h)), varied.get("start", np.asarray(plan.t0))
@@ -172,7 +173,8 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
         for sign in signs:
             along = sign * np.sign(some.h) * values
             rises = (along[:-1] < 0) & (along[1:] >= 0)
-            rises[:1] |= (along[:1] == 0) & (along[1:2] > 0)  # a start on the section
+            # A start on the section counts as a crossing if the function then grows.
+            rises[:1] |= (along[:1] == 0) & (along[1:2] > 0)
             counts[part] += rises.sum(axis=0)
     return counts
 

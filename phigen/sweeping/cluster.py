@@ -11,7 +11,7 @@ from phigen.errors import PhigenError
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
-#: Number of attempts to compute a chunk. If the worker process dies in each of them, the sweep stops.
+#: Number of attempts to compute a chunk. If the worker process ends unexpectedly in each attempt, the sweep stops.
 TRIES = 4
 
 #: Number of chunks that are submitted in advance for each thread of the workers.
@@ -20,7 +20,7 @@ _AHEAD = 4
 #: Time limit for the first answer of a scheduler, in the notation of Dask.
 PATIENCE = "10s"
 
-#: Type of the function that receives, after each chunk, the numbers of its members and of its failed members.
+#: Type of a function that is called after each chunk, with the numbers of its members and of its failed members.
 Tell = Callable[[int, int], None]
 
 

@@ -48,8 +48,7 @@ _SHORT = 40
 def differences(
     job: store.Job, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> list[str]:
-    """Return phrases for messages, one for each difference between the sweep in a store and the requested
-    sweep.
+    """Return phrases for messages, one for each difference between the sweep in a store and the requested sweep.
 
     The requested sweep has the ``plan``, the ``solver`` (as `store.solver_data` describes it), the ``spec``, and the
     values ``listed`` of a file of members.
@@ -68,7 +67,7 @@ def differences(
 
 
 def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry ``about`` of a plan (target, version, data files) with the folder of the spec as ``folder``."""
+    """Return the entry ``about`` of a plan, and add the folder of the spec under the key ``folder``."""
     return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
 
 
@@ -88,7 +87,7 @@ def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
 
 
 def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[str]:
-    """Return a phrase if the code of the solver differs, apart from the headers of files and the digest of the spec."""
+    """Return a phrase if the code of the solver differs, without headers of files and the digest of the spec."""
     stored = store.solver_data(job.interface, job.files, job.functions, job.spec)
     stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, solver))
     same = stored["interface"] == solver["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
@@ -103,7 +102,7 @@ def _body(text: str) -> str:
 def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
     """Return phrases for differences in those settings of the run that are not in the plan.
 
-    They are the section, and the initial state and arrays of a lattice; workers read them from the spec.
+    These settings are the section, and the initial state and arrays of a lattice. Workers read them from the spec.
     """
     if "crossings" not in plan.keep and not plan.sizes:
         return []

@@ -30,9 +30,10 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def begun(spec: Spec, run: Run, draw: int) -> Start:
-    """Return the initial state and parameters of a member; ``draw`` is its value along the axis ``seed``, or 0.
+    """Return the initial state and parameters of a member.
 
-    The number ``draw`` is added to the seeds of all random values of the run.
+    ``draw`` is the value of the member along the axis ``seed``; 0 if there is no such axis. It is added to the seeds of
+    all random values of the run.
     """
     if not draw or run.lattice is None:
         return start_of(spec, run)
@@ -175,10 +176,10 @@ def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapp
 def energies_at_start(
     job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int
 ) -> tuple[Floats, Floats]:
-    """Return two arrays (members,) for ``count`` members: initial energies, and magnitudes of their terms.
+    """Return the initial energies of ``count`` members, and the sums over all sites of |energy of a site|.
 
-    The second array has the sum over the sites of |energy of the site|. Both arrays have NaN for members whose values
-    are not allowed. ``varied`` has the values of the varied quantities.
+    Both arrays have the shape (members,), and NaN for members whose values are not allowed. ``varied`` has the values
+    of the varied quantities.
     """
     energies = np.full((2, count), np.nan)
     for m in range(count):
@@ -193,7 +194,7 @@ def energies_at_start(
 
 
 def exponent(session: LatticeSession, h: float, steps: int) -> float:
-    """Return the largest Lyapunov exponent of a run, from the growth of a tangent vector over all steps.
+    """Return the largest Lyapunov exponent of a run, from the growth of one tangent vector during all steps.
 
     ``session`` must be at the start of the run. Raises `BackendError` if a step fails.
     """

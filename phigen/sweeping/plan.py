@@ -28,11 +28,11 @@ class Plan:
     """Numerical description of a sweep.
 
     ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
-    ranges of the varied quantities; values along axes without a size are drawn at random with ``seed``. ``noise`` is
-    the seed of the noise; each member has its own path of the noise. ``members`` is 0 for a grid; otherwise it is the
-    number of random members or of the rows of a file, and the only dimension is ``member``. ``listed`` names the
-    columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice, workers compute the
-    initial state from the spec, and ``initial`` is not used.
+    ranges of the varied quantities. An axis without a number of values has values that are drawn at random with
+    ``seed``. ``noise`` is the seed of the noise; each member has its own path of the noise. ``members`` is 0 for a
+    grid. Otherwise it is the number of random members or of the rows of a file, and the only dimension is ``member``.
+    ``listed`` names the columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice,
+    workers compute the initial state from the spec, and ``initial`` is not used.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Plan:
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """The axes without a number of values, which are no dimensions: a value is drawn at random for each member."""
+        """The axes without a number of values. They are no dimensions: the value of each member is drawn at random."""
         return tuple(axis for axis in self.axes if not axis.size)
 
     @property
@@ -99,17 +99,17 @@ class Plan:
 
     @property
     def bytes_of_member(self) -> int:
-        """Lower bound, in bytes, of the memory that a member needs: for its frames and four further states."""
+        """Lower bound, in bytes, of the memory that a member needs. It counts the frames and four more states."""
         return 8 * len(self.coordinates) * prod(self.sizes) * (len(self.rows) + 4)
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """Return the region of the chunk with this number, a slice of members along each dimension."""
+        """Return the region of the chunk with this number. A region has a slice of members along each dimension."""
         place = np.unravel_index(number, self.boxes)
         ends = zip(place, self.chunk, self.shape, strict=True)
         return tuple(slice(int(k) * of, min((int(k) + 1) * of, size)) for k, of, size in ends)
 
     def first(self, region: Sequence[slice]) -> int:
-        """Return the number of the first member of a region, which consists of slices along the dimensions."""
+        """Return the number of the first member of a region, which has a slice of members along each dimension."""
         return int(np.ravel_multi_index([part.start for part in region], self.shape))
 
     def varied(self, region: Sequence[slice], listed: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -167,9 +167,10 @@ def _spaced(axis: Axis, share: Floats) -> Floats:
 
 
 def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
-    """Return ``count`` uniform random numbers for one quantity, ``column``, of the members from ``first`` on.
+    """Return uniform random numbers for ``count`` members, from the member ``first`` on.
 
-    A random number depends on the seed, the quantity and the member only, not on the division into chunks.
+    The numbers are for one varied quantity, which is numbered by ``column``. A random number depends only on the seed,
+    the quantity and the member, not on the division into chunks.
     """
     stream = np.random.Philox(key=[seed, column])
     stream.advance(first // 4)  # the generator makes four numbers at a time
@@ -177,8 +178,10 @@ def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
 
 
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
-    """Return the sizes, along the dimensions, of chunks of at most ``members`` members that fit into the memory
-    limit."""
+    """Return the sizes of chunks along the dimensions.
+
+    A chunk has at most ``members`` members, and fits into the memory limit.
+    """
     left = max(1, min(members, _MOST_BYTES // plan.bytes_of_member))
     sides: list[int] = []
     for size in reversed(plan.shape):

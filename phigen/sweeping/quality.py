@@ -1,4 +1,4 @@
-"""Detection of members of a sweep that have meaningless results, by their large energy errors."""
+"""Detection of members of a sweep whose results are meaningless. Such members have large energy errors."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ class EnergyErrors:
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
     """Return the number of members of a sweep whose stored energy error exceeds ``limit``, and the largest error.
 
-    Errors are relative to the initial energy, or to its terms if these nearly cancel. Members that failed or are not
-    computed yet are not counted. If time, forces or noise change the energy, no member is counted.
+    Errors are relative to the initial energy. If the terms of the initial energy nearly cancel, errors are relative to
+    the terms. Members that failed or are not computed yet are not counted. If time, forces or noise change the energy,
+    no member is counted.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
@@ -42,7 +43,8 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
     """Return the number of members of a sweep of a lattice whose energy error exceeds ``limit``, and the largest error.
 
-    Errors are relative to the initial energy, for which the initial states of all members are computed again.
+    Errors are relative to the initial energy. The store does not contain it, so the initial states of all members are
+    computed again.
     """
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()

@@ -16,17 +16,18 @@ from phigen.spec.names import STATISTICS
 from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
-#: Largest memory in bytes for the states of a run that statistics need; members are treated in groups of this size.
+#: Largest memory in bytes for the states of the members that are integrated at once. Members are divided into groups
+#: accordingly.
 MOST_BYTES = 64 * 2**20
 
 
 def statistics_of(
     job: Job, solver: Solver, members: Members, states: Floats, statistics: Mapping[str, Statistic]
 ) -> dict[str, Floats]:
-    """Return the requested values of observables for the members, by keyword such as mean(M), (members,) each.
+    """Return the requested values of observables, by keyword such as mean(M), with one value for each member.
 
-    ``states`` (rows, members, DIM) are the frames of the sweep, or only the final states. Statistics are over the rows
-    of the frames. Without frames the members are integrated again, and statistics are over every ``stride``-th step,
+    ``states`` (rows, members, DIM) are the frames of the sweep, or only the final states. Statistics are over the
+    frames. If no frames are stored, the members are integrated again, and statistics are over every ``stride``-th step,
     start and end included, as in ``phigen run``. Rows before ``plan.after`` are left out.
     """
     names = list(solver.interface.observables)
@@ -74,7 +75,7 @@ def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: 
 def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> Floats:
     """Return the standard errors of the means of observables over the rows, (members, observables).
 
-    They follow from the means of blocks of rows; ``numbers`` are the step numbers of the rows.
+    The standard errors follow from the means of blocks of rows. ``numbers`` are the step numbers of the rows.
     """
     values = _values(job, solver, members, rows, numbers)
     errors = np.empty(values.shape[1:])
@@ -92,7 +93,7 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
 def _member_groups(
     job: Job, solver: Solver, members: Members, states: Floats
 ) -> Iterator[tuple[slice, Members, Floats, Floats]]:
-    """Yield groups of members whose states fit into memory: their slice, the members, their states, the step numbers.
+    """Yield groups of members whose states fit into memory, as (slice, members, states, step numbers).
 
     The states (rows, members, DIM) are those over which statistics are taken.
     """

@@ -1,8 +1,8 @@
 """Store of a sweep: a Zarr group, which xarray opens as a Dataset.
 
 The group contains an array for each result, in the chunks of the sweep, and the values along the dimensions. The array
-``status`` is written last, so that a chunk whose members have a status is complete. The attributes of the subgroup
-``made_by`` are the plan and the source of the solver.
+``status`` is written last. So if the members of a chunk have a status, the chunk is complete. The attributes of the
+subgroup ``made_by`` are the plan and the source of the solver.
 """
 
 from __future__ import annotations
@@ -74,9 +74,10 @@ class Job:
         return load_module(self.functions, self.interface.name)
 
     def section(self) -> tuple[Callable[[Floats, Mapping[str, Floats]], Floats], str, tuple[float, ...]]:
-        """Return the section of the run: its function, the name of the time, and the directions (signs) of crossings.
+        """Return the section of the run: a function that is 0 on it, the name of the time, and the signs of crossings.
 
-        The function takes states (…, DIM), and the values of parameters and time by name.
+        The function takes states (…, DIM), and the values of parameters and time by name. The sign of a crossing is its
+        direction.
         """
         from phigen import spec as specs
         from phigen.symbolic.arrays import evaluate
@@ -94,7 +95,9 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash that identifies the results: of the solver, and of the plan without the division into chunks."""
+    """Return a hash of the solver and of the plan, which identifies the results. The division into chunks is
+    left out.
+    """
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 
@@ -141,8 +144,7 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        # The array has no fill value, since the default is 0, and readers take elements with the fill value for missing
-        # data.
+        # The fill value must be None. Otherwise it is 0, and readers take each 0 for a missing value.
         root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)
 
     for axis in plan.grid if not plan.members else ():

@@ -1,4 +1,4 @@
-"""Computation of a sweep: the store is created or continued, and all missing chunks are computed."""
+"""Computation of a sweep: creation or continuation of the store, and computation of all missing chunks."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_
 #: Intended processor time of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: For Lyapunov exponents: assumed time, in seconds, of a step with its tangent map. Python processes the tangent maps.
+#: For Lyapunov exponents: assumed time of a step with its tangent map, in seconds. It is long, since Python processes
+#: the tangent maps.
 _TANGENT = 40e-6
 
 #: Smallest and largest number of members of a chunk.
@@ -83,11 +84,11 @@ def made(
     started: Callable[[int], None],
     tell: cluster.Tell,
 ) -> Outcome:
-    """Compute the members of a sweep that its store does not contain yet; ``started`` receives their number.
+    """Compute the members of a sweep that its store does not contain yet.
 
-    ``tell`` receives the numbers of computed and failed members after each chunk. Raises `SpecError`, `FileError` if
-    the store contains another sweep, `LimitError` if the chunks that are computed at the same time do not fit into
-    memory, and `SweepError` if the computation stops.
+    ``started`` receives the number of these members. ``tell`` receives the numbers of computed and failed members after
+    each chunk. Raises `SpecError`; `FileError` if the store contains another sweep; `LimitError` if the chunks that are
+    computed at the same time do not fit into memory; and `SweepError` if the computation stops.
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
@@ -155,12 +156,12 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> No
 
 
 def _with_ensembles(spec: Spec) -> Spec:
-    """Return the spec with the code for ensembles, which sweeps need, even if ``without:`` leaves it out."""
+    """Return the spec with the code for ensembles, even if ``without:`` leaves it out: sweeps need this code."""
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """Raise `LimitError` if two arrays with the values along a dimension, which are needed, do not fit into memory."""
+    """Raise `LimitError` if the values along a dimension do not fit into memory. Two arrays of them are needed."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
@@ -199,8 +200,10 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, Any]:
-    """Return the path of the spec, and the digests of the data files that a run of a lattice reads; {} without
-    files."""
+    """Return the path of the spec, and the digests of the data files that a run of a lattice reads.
+
+    The result is {} if the run reads no files.
+    """
     if run.lattice is None:
         return {}
     values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
@@ -235,10 +238,10 @@ def _gone_on_with(
 def _created(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
-    """Create the store ``output``, with chunks whose size keeps all ``slots`` threads of workers busy; return it
-    opened.
+    """Create the store ``output``, and return it opened.
 
-    If another process has created this store in the meantime, that store is returned.
+    The chunks are small enough to keep all threads of the workers busy; ``slots`` is the number of these threads. If
+    another process has created this store in the meantime, the store of the other process is returned.
     """
     job = store.Job(
         None, plan, store.interface_of(solver["interface"]), solver["files"], solver["functions"], solver["spec"]

@@ -32,7 +32,8 @@ STATES = 5
 ROWS = 2000
 #: Classical methods of the comparison, with their names in tables.
 PEERS = {"rk4": "RK4", "dop853": "DOP853"}
-#: Shares of the time budget: for all builds, and for the reference solution with which one orbit is compared.
+#: Shares of the time budget. BUILDING: for all builds. REFERRING: for each reference solution; each method needs its
+#: own.
 BUILDING, REFERRING = 0.6, 0.05
 
 Notify = Callable[[str], object]
@@ -106,11 +107,11 @@ def compare(
     budget: float = 60.0,
     note: Notify = lambda text: None,
 ) -> Comparison:
-    """Measure on one run the setting of the spec, all other settings of these ``orders``, RK4 and DOP853.
+    """Measure methods on one run: the setting of the spec, all other settings of these ``orders``, RK4 and DOP853.
 
-    ``compilation`` must have been made with tangent maps. If ``equal`` is ``work``, each method uses the step size with
-    which its run costs as much as that of the setting of the spec. The comparison takes about ``budget`` seconds.
-    Raises `StepError` if the setting of the spec cannot make the run.
+    ``compilation`` must have been made with tangent maps. If ``equal`` is ``work``, all methods take the same processor
+    time: their step sizes are chosen so that a run costs as much as that of the setting of the spec. The comparison
+    takes about ``budget`` seconds. Raises `StepError` if the setting of the spec cannot make the run.
     """
     start = time.perf_counter()
     current = own_setting(compilation)

@@ -22,10 +22,10 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, rounding_of
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
 
-#: Number of sites of a grid above which methods are measured on a smaller grid instead.
+#: A grid with more sites than this is replaced by a smaller one, on which methods are measured.
 MOST_SITES = 10_000
-#: Largest number of values (states times coordinates) that are stored for one run; and largest number of coordinates
-#: for runs whose orbits are compared with a reference solution.
+#: MOST_NUMBERS: largest number of values (states times coordinates) that are stored for one run. MOST_COMPARED: largest
+#: number of coordinates with which orbits are compared with a reference solution.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
 #: Largest number of states at which the energy of one run is evaluated. Each evaluation is a call from Python, and goes
 #: over all sites.
@@ -83,7 +83,7 @@ class FlatLattice:
         return np.array([self._evaluation_session(x, parameters).hamiltonian() for x in states])
 
     def terms(self, x: Floats, parameters: Mapping[str, Any]) -> float:
-        """Return the sum over the sites of the absolute values of their energies, at a state ``x`` (DIM,)."""
+        """Return the sum of |energy of a site| over all sites, at a state ``x`` (DIM,)."""
         return float(np.abs(self._evaluation_session(x, parameters).density()).sum())
 
     def _evaluation_session(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
@@ -103,8 +103,8 @@ class FlatLattice:
 class LatticeProblem(Problem):
     """Tuning problem of a lattice with given sizes and parameter arrays.
 
-    ``seer`` is the solver that evaluates energies. ``whole`` are the sizes in the run of the spec. They are larger than
-    the sizes in the problem if methods are measured on a smaller lattice.
+    ``seer`` is the solver that evaluates energies. ``whole`` are the sizes of the lattice in the run of the spec. If
+    methods are measured on a smaller lattice, ``sizes`` are smaller than ``whole``.
     """
 
     cell: Cell = field(kw_only=True)
@@ -197,9 +197,9 @@ def lattice_problem(
 
 
 def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
-    """Return sizes of a grid with at most about `MOST_SITES` sites, by halving the largest of ``sizes`` repeatedly.
+    """Return sizes of a grid with at most about `MOST_SITES` sites. The largest of ``sizes`` is halved repeatedly.
 
-    A size remains a multiple of its entry in ``periods``, and at least as large as that in ``least``.
+    Each size remains a multiple of its entry in ``periods``, and does not fall below its entry in ``least``.
     """
     reduced = list(sizes)
     while np.prod(reduced) > MOST_SITES:

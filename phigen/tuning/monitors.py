@@ -51,10 +51,10 @@ MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
 MOST_LETTERS = 160
-#: HIGHEST: largest order at which monitors are compared. FEWEST: a run may have at least MOST · FEWEST steps, even if
-#: the run without a monitor needs fewer than FEWEST. SECONDS: largest duration of a run in seconds.
+#: HIGHEST: largest order at which monitors are compared. FEWEST: if the run without a monitor needs fewer steps than
+#: this, runs with a monitor may still have MOST · FEWEST steps. SECONDS: largest duration of a run in seconds.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
-#: Share of the time until the deadline that is reserved for the runs, which follow all builds.
+#: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25
 #: HALVINGS: largest number of halvings of a step. MOST: largest number of steps of a run with a monitor, as a multiple
 #: of the number of steps without one.
@@ -81,8 +81,8 @@ class Trial:
 class Monitors:
     """Results of the search for a monitor, over a ``span`` of time.
 
-    ``plain`` is the result without a monitor. ``found`` has the results with monitors, that with the shortest computing
-    time first, since steps of different schemes differ in cost. ``refused`` has the reasons why other monitors were not
+    ``plain`` is the result without a monitor. ``found`` has the results with monitors. They are sorted by computing
+    time, since steps of different schemes differ in cost. ``refused`` has the reasons why other monitors were not
     built.
     """
 
@@ -138,7 +138,7 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
-    """Yield (1 + Σ 1/b)^exponent, with a sum over as many of the first bases b as `MOST_LETTERS` allows.
+    """Yield (1 + Σ 1/b)^exponent. The sum is over the first of the ``bases`` b, as many as `MOST_LETTERS` allows.
 
     Nothing is yielded if fewer than two bases fit.
     """
@@ -159,7 +159,7 @@ def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
 
 
 def _bases(system: System) -> list[Expression]:
-    """Return the expressions in denominators, under roots and in logarithms of H that depend on coordinates."""
+    """Return the expressions in H that depend on coordinates, and are denominators, or under roots or in logarithms."""
     by_text: dict[str, Expression] = {}
     for node in topological([system.hamiltonian]):
         rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))
@@ -187,8 +187,8 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
     """Return the settings to build, all of the same order.
 
-    The first has no monitor. Then come a splitting with the monitor ``log``, and each monitor with the series and with
-    Gauss collocation.
+    The first setting has no monitor. The second is a splitting with the monitor ``log``. The others combine each of the
+    ``monitors`` with the series and with Gauss collocation.
     """
     order = min(order + order % 2, HIGHEST)
     series = (

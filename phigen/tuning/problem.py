@@ -66,7 +66,7 @@ class Problem(ABC):
     @property
     @abstractmethod
     def evens_out(self) -> bool:
-        """Whether monitors may be tried. With a monitor, the motion has a more uniform speed in the time τ."""
+        """Whether monitors may be tried. They even out the speed of the motion."""
 
     def method(self, solver: Backend) -> Candidate:
         """Return the method of a solver, which makes runs from the initial state of this problem."""
@@ -78,7 +78,7 @@ class Problem(ABC):
 
     @abstractmethod
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Return the classical methods ``names``; their runs start from the content of the array ``state``."""
+        """Return the classical methods ``names``. Their runs start from the content of the array ``state``."""
 
     @abstractmethod
     def energies(self, states: Floats) -> Floats:
@@ -175,7 +175,7 @@ class CompiledMethod(Protocol):
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function for timing. A call with a number makes this number of further steps of size ``h``.
+        """Return a function for timing. A call of it with a number n makes n further steps of size ``h``.
 
         The first call starts from the initial state.
         """

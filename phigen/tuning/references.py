@@ -60,8 +60,9 @@ def agreed(
 ) -> Reference:
     """Return the reference solution over a time span by the method ``first``, confirmed by the method ``second``.
 
-    ``accuracy`` is the smallest error, relative to the largest coordinate, that is to be measured with the reference;
-    ``seconds`` is the time limit of each method. Raises `CheckError` if the methods do not agree well enough for that.
+    ``accuracy`` is the smallest error that is to be measured with the reference, relative to the largest coordinate.
+    ``seconds`` is the time limit of each method. Raises `CheckError` if the two solutions differ too much for this
+    accuracy.
     """
     spacing = span / MARKS
     orbits = []
@@ -87,10 +88,11 @@ def agreed(
 def orbit_error(
     states: Floats, spacing: float, reference_method: CompiledMethod, step: float, seconds: float
 ) -> float | None:
-    """Return the largest distance of ``states`` (rows, DIM) at multiples of a spacing from a reference solution.
+    """Return the largest distance between ``states`` (rows, DIM), at multiples of ``spacing``, and a reference
+    solution.
 
-    The reference is computed by another method, with steps of at most ``step``. The distance is relative to the largest
-    coordinate. It is None if the reference does not become accurate enough within ``seconds``.
+    The distance is relative to the largest coordinate. The reference solution is computed by another method, with steps
+    of at most ``step``. The result is None if the reference does not become accurate enough within ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
     orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)
@@ -110,8 +112,8 @@ def _converged(
 ) -> tuple[Floats, float, float] | None:
     """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the states.
 
-    The step is halved until a halving changes the states little, until it changes them more than the previous halving
-    did, or until the time ``until``. The result is None if steps of all sizes fail.
+    The step is halved repeatedly. This ends when halving changes the states little, when it changes them more than the
+    previous halving did, or at the time ``until``. The result is None if steps of all sizes fail.
     """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None

@@ -14,15 +14,16 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: PIECE_SECONDS: processor time, in seconds, in which the method of the spec integrates over the time span of the
-#: search, with the step of the run. PIECE_STEPS: largest number of these steps; their least number is 500.
+#: PIECE_SECONDS: processor time, in seconds, for which the method of the spec runs with the step of the run. The time
+#: that it reaches is the time span of the search. PIECE_STEPS: largest number of steps for this; the least number is
+#: 500.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.
 MOST_TURN, LEAST_STEPS = 2.0, 24
 #: DENSE: largest dimension for which all eigenvalues of the derivative are computed. In higher dimensions the
-#: derivative is applied FOLLOWED times to a vector, whose growth after the first SETTLING times gives slightly less
-#: than the largest eigenvalue.
+#: derivative is applied FOLLOWED times to a vector. The growth of the vector, after the first SETTLING times, gives
+#: slightly less than the largest eigenvalue.
 DENSE, SETTLING, FOLLOWED = 256, 8, 16
 
 
@@ -56,10 +57,9 @@ def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -
 
 
 def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
-    """Return the largest absolute value of an eigenvalue of the derivative of the vector field at ``states`` (rows,
-    DIM).
+    """Return the largest absolute value of an eigenvalue of the derivative of a vector field at several states.
 
-    In high dimensions it is an estimate.
+    ``states`` has the shape (rows, DIM). In high dimensions the result is an estimate.
     """
     size = size_of(states)
     width, rate = 1e-6 * size, 0.0

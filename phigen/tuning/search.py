@@ -18,13 +18,13 @@ FAILURES = 16
 BEYOND = 1 / 30
 #: Steps are chosen for this fraction of the accuracy, since the error of a longer run is slightly larger.
 AIM = 0.8
-#: The search for a cheaper step goes on to smaller steps, which may need fewer iterations. It ends when the cost
-#: exceeds the least cost by this factor.
+#: The search for a cheaper step continues with smaller steps, which may need fewer iterations. The search ends when the
+#: cost exceeds the least cost by this factor.
 DEARER = 1.25
 #: A method is not tried at other orders if its cost exceeds the least cost by more than this factor.
 KEEP = 3.0
-#: A scan has reached rounding error if halving the step divides the error by less than GAIN, and if the error is below
-#: SMALL or below MANY_ROUNDINGS times the rounding error of one step.
+#: A scan has reached rounding error if halving the step divides the error by less than GAIN, and if the error is small:
+#: below SMALL, or below MANY_ROUNDINGS times the rounding error of one step.
 GAIN, SMALL, MANY_ROUNDINGS = 1.5, 1e-9, 1000
 
 
@@ -74,7 +74,7 @@ class Curve:
 def _index_of_least_error(points: Sequence[Point]) -> int:
     """Return the index of the first point whose error is rounding error; at smaller steps, rounding errors grow.
 
-    If there is no such point, return the index of the last point.
+    If no error is rounding error, the index is that of the last point.
     """
     least = min((p.error for p in points), default=0.0)
     return next(
@@ -96,7 +96,8 @@ def at_floor(points: Sequence[Point]) -> bool:
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
     """Return the largest step whose error is at most ``accuracy``; None if the measurements show no such step.
 
-    It is interpolated between measured steps or, below the smallest one, extrapolated by the order of the method.
+    The step is interpolated between measured steps. If it is smaller than all of them, it is extrapolated by the order
+    of the method.
     """
     points = points[: _index_of_least_error(points) + 1]
     if not points:
@@ -151,7 +152,7 @@ def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
 def nanoseconds_at(points: Sequence[Point], step: float) -> float:
     """Return the time of one step in nanoseconds, interpolated between measured step sizes.
 
-    Outside the range of measured sizes it is the time of the nearest one.
+    Outside the range of measured sizes, the result is the time of the nearest measured step.
     """
     by_step = sorted(points, key=lambda p: p.step)
     for low, high in pairwise(by_step):
@@ -172,9 +173,10 @@ def scan(
 ) -> tuple[Point, ...]:
     """Measure a method with decreasing step sizes, until the accuracy is reached and the cheapest step is known.
 
-    ``measure(h)`` returns the point for a step size, None if a step fails. The scan begins at the largest possible
-    step, which is at most ``largest_step`` and is searched from ``first`` on. It ends early if the accuracy would cost
-    more than ``worth`` nanoseconds per unit of time, if only rounding errors are left, or if ``patience()`` is False.
+    ``measure(h)`` returns the point for a step size, None if a step fails. The scan begins at the largest step that
+    succeeds and is at most ``largest_step``; the search for this step begins at ``first``. The scan ends early if the
+    accuracy would cost more than ``worth`` nanoseconds per unit of time, if only rounding errors are left, or if
+    ``patience()`` is False.
     """
     points = _points_at_largest_step(measure, min(first, largest_step), largest_step, patience)
     while points and len(points) < MOST_POINTS and patience():
@@ -222,7 +224,8 @@ def _points_at_largest_step(
 ) -> list[Point]:
     """Return the first points of a scan, from the largest possible step down to ``first``.
 
-    If a run with ``first`` fails, the step is reduced by factors `FINER` until a run succeeds; [] if none does.
+    If a run with ``first`` fails, the step is reduced by factors `FINER` until a run succeeds. If no run succeeds, the
+    list is empty.
     """
     step, point = first, measure(first)
     for _ in range(FAILURES):
@@ -255,10 +258,10 @@ def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: 
 
 
 def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
-    """Return the settings to try next, the most promising first; [] if none is promising.
+    """Return the settings to try next, the most promising first. The list is empty if no setting is promising.
 
-    A method whose cost is near the least cost is tried at the next higher order. If that does not reduce its cost, the
-    next lower order is tried. The best method is also tried without gauge and as a composition.
+    A method whose cost is near the least cost is tried at the next higher order. If the higher order does not reduce
+    the cost, the next lower order is tried. The best method is also tried without gauge and as a composition.
     """
     costs = {setting: curve.cost(accuracy) for setting, curve in tried_curves.items()}
     families: dict[Setting, dict[int, float]] = {}
@@ -287,10 +290,10 @@ def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting],
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
-    """Return the setting with the next higher order if it was neither tried nor refused, else with the next lower
-    order.
+    """Return the setting with the next higher order, or the one with the next lower order.
 
-    ``orders`` has the costs of the orders that were tried. The list is empty if the neighbours were tried or refused.
+    The lower order is taken if there is no higher one, or if the higher one was tried or refused. If the lower one was
+    tried or refused too, the list is empty. ``orders`` has the costs of the orders that were tried.
     """
     higher_orders = [k for k in best.orders if k > best.order]
     lower_orders = [k for k in best.orders if k < best.order]

@@ -17,11 +17,11 @@ from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
-#: Name for a choice in the spec for which there is no word: formulas, or options of a bi-realisation.
+#: Name for a choice of the spec that one word cannot express, such as formulas, or options of a bi-realisation.
 OWN = "as in the spec"
 
-#: Orders that are tried for series without composition; for the kind canonical-euler, order 1 is tried too, which is
-#: explicit for separable H.
+#: Orders that are tried for series without composition. For the kind canonical-euler, order 1 is tried too, since its
+#: step is explicit for separable H.
 ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 
 #: Word for ``kind`` of a setting that is a splitting, and so has no bi-realisation.
@@ -34,8 +34,8 @@ GAUSS_ORDERS = (4, 8, 12, 16)
 #: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
 AUTO = "auto scheme"
 
-#: Compositions that are tried for near-integrable H = A + εB, with their orders. Those without a corrector differ in
-#: the powers of ε and h in their errors. The two with a corrector have the cheapest steps.
+#: Compositions that are tried for near-integrable H = A + εB, with their orders. The errors of those without a
+#: corrector differ in the powers of ε and h. The two with a corrector have the cheapest steps.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),
@@ -54,9 +54,9 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 class Setting:
     """A choice of method: bi-realisation or other scheme, order, gauge and composition.
 
-    ``kind`` is the kind of bi-realisation, or `SPLITTING`, `GAUSS` or `AUTO` for other schemes; ``of`` is the inner
-    kind of products and pull-backs. `OWN` as ``kind`` or ``gauge`` leaves the choice of the spec. An empty ``monitor``
-    leaves the monitor of the spec.
+    ``kind`` is the kind of bi-realisation, or `SPLITTING`, `GAUSS` or `AUTO` for other schemes. ``of`` is the inner
+    kind of products and pull-backs. If ``kind`` or ``gauge`` is `OWN`, the choice of the spec remains. If ``monitor``
+    is empty, the monitor of the spec remains.
     """
 
     kind: str
@@ -167,8 +167,9 @@ def charts(system: System, current: Setting) -> list[Setting]:
     """Return the settings to measure first.
 
     They are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation that might
-    apply, at order 4. Their builds show which of them apply. Left out are kinds that need formulas of the user, and,
-    for constant or linear π, Karasev's paths, since other kinds have the same maps in closed form.
+    apply, at order 4. A bi-realisation that does not apply is found when it is built. Kinds that need formulas of the
+    user are left out. If π is constant or linear, Karasev's paths are left out too, since other kinds have the same
+    maps in closed form.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
@@ -196,16 +197,18 @@ def _near_integrable(system: System) -> list[Setting]:
 
 
 def direct(setting: Setting) -> str:
-    """Return the value of ``composition:`` for a setting of this scheme without a composition of whole steps.
+    """Return the value of ``composition:`` with which a step of this scheme is not composed of whole steps.
 
-    It is ``none`` for series and Gauss methods; splittings, whose flows are always composed, have ``auto``.
+    The value is ``none`` for series and Gauss methods. Splittings always compose flows, and have ``auto``.
     """
     return "auto" if setting.is_splitting or setting.composition == "auto" else "none"
 
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
-    """Return variants of a setting of about the same order: without gauge if it is ``gauged``; as a composition if it
-    is ``symmetric``."""
+    """Return variants of a setting, of about the same order.
+
+    One is without gauge, if the setting is ``gauged``. Another is a composition, if the setting is ``symmetric``.
+    """
     variations = [replace(best, gauge="none")] if gauged else []
     if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}

@@ -20,20 +20,21 @@ from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
-#: The search measures methods in short runs; a longer run then confirms the step that it proposes for a method.
-#: CONFIRMING: share of the time budget for such a run. PATIENCE: the run may take this multiple of the share. ATTEMPTS:
-#: number of steps that are tried for one method.
+#: The search measures methods in short runs, and proposes a step size for each. Then a longer run with this step size
+#: confirms that the method reaches the accuracy. CONFIRMING: share of the time budget that the longer run should take.
+#: PATIENCE: multiple of this share that the run may take at most. ATTEMPTS: number of step sizes that are tried for one
+#: method.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: FINALISTS: number of methods, the best ones, whose steps are confirmed and timed. BEHIND: largest cost of these
-#: methods relative to the best one. ROUNDS: number of rounds of timings.
+#: FINALISTS: number of best methods whose steps are confirmed and timed. BEHIND: largest cost of these methods relative
+#: to the best one. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
 #: Longer runs that test methods begin only before this share of the time budget is used up. If no method has passed the
 #: test by then, further methods are tested, with one step size each, until one passes.
 CONFIRMED = 1.0
 #: Share of the time budget after which no further round of timings begins. A round takes about a tenth of the budget.
 TIMED = 1.1
-#: Share of the time budget after which no monitor and no automatic scheme is tried. It is larger than 1: even if the
-#: search has used up the budget, another half of the budget remains for monitors.
+#: Share of the time budget after which neither monitors nor ``scheme: auto`` are tried. It is larger than 1, so that
+#: half of a budget remains for monitors even if the search has used up the whole budget.
 MONITORED = 1.5
 #: Costs that differ by less than this factor count as equal, and the simpler method is preferred.
 EQUAL = 1.1
@@ -108,7 +109,7 @@ class Tuning:
 
     @property
     def closest(self) -> tuple[Curve, Point]:
-        """The curve and the point on it with the smallest error that was measured for a method of phigen."""
+        """Curve and point of the smallest error that was measured for a method of phigen."""
         measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
         return min(measured_points, key=lambda pair: pair[1].error)
 
@@ -186,8 +187,8 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
     """Return the finalists in the order of their cost, except that the first one is the simplest of the best.
 
-    Among methods whose cost is about the least one, the simplest has the smallest product of order and number of
-    stages. If two methods have the same product, the one without gauge is the simpler one.
+    The best are the methods whose cost is about the least one. The simplest of them has the smallest product of order
+    and number of stages. If two methods have the same product, the one without gauge is the simpler one.
     """
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
@@ -196,7 +197,7 @@ def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
 
 
 def final(tuner: Tuner, current: Curve) -> list[Finalist]:
-    """Return the best methods, and that of the spec, each with a step that a longer run has confirmed.
+    """Return the best methods and the method of the spec, each with a step size that a longer run has confirmed.
 
     ``current`` is the curve of the setting of the spec.
     """
@@ -215,10 +216,11 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
-    """Confirm the cheapest step of a method, rounded down, by a run over the horizon or as much of it as time allows.
+    """Confirm the cheapest step of a method, rounded down, by a longer run, and return the result of this run.
 
-    If the run misses the accuracy, a smaller step is tried, at most `ATTEMPTS` steps in all. None if no step reaches
-    the accuracy, or if there is not enough time.
+    The run extends over the horizon, or over as much of it as time allows. If the run misses the accuracy, a smaller
+    step is tried, at most `ATTEMPTS` steps in all. The result is None if no step reaches the accuracy, or if there is
+    not enough time.
     """
     accuracy = tuner.accuracy
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
@@ -242,8 +244,8 @@ def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
 def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
     """Return the duration of a run that confirms a step of size ``h``: the horizon, or as much as the budget allows.
 
-    If orbits are measured, it is the time span of the reference. It is 0 if even a run over the time span of the search
-    would take too long.
+    If orbits are measured, the duration is the time span of the reference solution. The result is 0 if even a run over
+    the time span of the search would take too long.
     """
     seconds_per_step = 1e-9 * search.nanoseconds_at(curve.points, h)
     affordable = h * CONFIRMING * tuner.clock.budget / seconds_per_step

@@ -19,8 +19,8 @@ FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
     """Return the processor time of a step of size ``h`` in nanoseconds, in a run of ``steps`` steps; NaN if steps fail.
 
-    It is the smallest of several measurements. The call from Python, and work that is done once for a run, such as the
-    choice of a gauge, are subtracted.
+    The result is the smallest of several measurements. It does not contain the call from Python, nor work that is done
+    once for a run, such as the choice of a gauge.
     """
     fastest = call = math.inf
     spent = 0.0
@@ -39,8 +39,9 @@ def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
 def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
     """Time the beginning of a run; return the measured seconds, and the estimated seconds of all ``steps`` steps.
 
-    The first steps of a solver in C are slower: its predictor is fitted first, and then steps are made in blocks. So
-    the parts grow until one takes long enough, and the last part determines the time of the remaining steps.
+    The first steps of a solver in C are slower than later ones, for two reasons: the predictor is not fitted yet, and
+    steps are not made in blocks yet. So the parts grow until one takes long enough. The last part determines the time
+    of the remaining steps.
     """
     seconds, steps_done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:

@@ -24,10 +24,10 @@ LINEAR, STEADY = 1.8, 1.3
 class Point:
     """Result of a method with one step size: its error, and the time of a step in ``nanoseconds``.
 
-    ``measured`` is the largest error in a run over ``time``, ``error`` the error that is expected over the whole
-    duration (horizon). ``growth`` is the power of time with which the error grows, NaN if unknown; ``rounding`` is the
-    part of the error that comes from rounding, and that smaller steps do not reduce. ``unit`` is the relative rounding
-    error of one step.
+    ``measured`` is the largest error in a run over ``time``. ``error`` is the error that is expected over the whole
+    duration (horizon). ``growth`` is the power of time with which the error grows, NaN if unknown. ``rounding`` is the
+    part of the error that comes from rounding; smaller steps do not reduce it. ``unit`` is the relative rounding error
+    of one step.
     """
 
     step: float
@@ -98,9 +98,9 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
     """Return the function that measures the largest distance of a run from a reference solution.
 
-    States are compared at about `MARKS` times; the distance is relative to the largest coordinate. It is extrapolated
-    to the horizon by a power of time. This is the measured power, at least 1 and at most 2. For methods with
-    ``bounded`` energy errors (Poisson maps) it is 1, unless the distance clearly grows faster.
+    States are compared at about `MARKS` times. The distance is relative to the largest coordinate, and is extrapolated
+    to the horizon by a power of time. The power is the measured one, at least 1 and at most 2. For methods with
+    ``bounded`` energy errors (Poisson maps) the power is 1, unless the distance clearly grows faster.
     """
 
     def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
@@ -130,7 +130,7 @@ def _rounding_unit(problem: Problem, method: CompiledMethod) -> float:
 def _growth(errors: Floats, rounding_unit: float) -> float:
     """Return the power of time with which errors at equidistant times grow; NaN if it cannot be determined.
 
-    It follows from the largest error in the first half of the run, and the largest error in the whole run.
+    The power follows from the largest error in the first half of the run, and the largest error in the whole run.
     """
     if len(errors) < 5:
         return math.nan

@@ -25,8 +25,8 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
 #: SCANNED: share of the time budget after which no candidate is measured. COMPARED: the same for classical methods.
 SCANNED, COMPARED = 0.9, 0.85
-#: The measurement of a method ends if reaching the accuracy costs more than a multiple of the least cost so far: WORTH
-#: for candidates, WORTH_KNOWING for classical methods.
+#: The measurement of a method ends if its cost exceeds this multiple of the least cost so far. Costs are those of
+#: reaching the accuracy. WORTH: multiple for candidates. WORTH_KNOWING: multiple for classical methods.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods with which the result is compared, with their names in tables and their orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
@@ -55,9 +55,9 @@ class TimeBudget:
 class Tuner:
     """A search in progress: the candidates that were tried, with their curves, and those that were refused.
 
-    ``measures`` has the functions that measure errors, by whether a step is a Poisson map. ``piece`` is the time span
-    over which candidates are measured, ``most`` the largest useful step. ``referring`` says whether orbits are compared
-    with a reference solution, instead of energies.
+    ``measures`` has two functions that measure errors: for methods whose steps are Poisson maps (True), and for others
+    (False). ``piece`` is the time span over which candidates are measured, ``most`` the largest useful step.
+    ``referring`` says that orbits are compared with a reference solution. Otherwise energies are measured.
     """
 
     def __init__(
@@ -85,8 +85,8 @@ class Tuner:
     def start(self, measure: str) -> Curve:
         """Measure the setting of the spec with several steps, and return its curve.
 
-        Its speed determines the time span of the search. ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if
-        there is no reference solution for orbits, and `StepError` if steps of all sizes fail.
+        The speed of its method determines the time span of the search. ``measure`` is ``energy`` or ``orbit``. Raises
+        `CheckError` if there is no reference solution for orbits, and `StepError` if steps of all sizes fail.
         """
         compilation = self.compilation
         setting = own_setting(compilation)
@@ -101,7 +101,7 @@ class Tuner:
         return curve
 
     def search(self, current: Curve) -> bool:
-        """Try candidates until none is promising, or the time is up; return whether no promising candidate is left.
+        """Try candidates until none is promising, or the time is up; return whether all promising ones were tried.
 
         ``current`` is the curve of the setting of the spec.
         """
@@ -175,7 +175,7 @@ class Tuner:
 
     @property
     def least(self) -> float:
-        """Least cost with which a method that was tried reaches the accuracy, in nanoseconds per unit of time."""
+        """Least cost of reaching the accuracy with a method that was tried, in nanoseconds per unit of time."""
         return min((c.cost(self.accuracy) for c in self.tried.values()), default=math.inf)
 
     def orbit_error(self, curve: Curve, h: float) -> float | None:
@@ -191,7 +191,7 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Return the settings whose builds will end in time, as estimated from lower orders; refuse all others."""
+        """Return the settings whose builds should end in time, estimated from lower orders; refuse all others."""
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
@@ -294,8 +294,8 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, s
 def expected_seconds(setting: Setting, tried_curves: Iterable[Curve]) -> float:
     """Return the estimated time of a build in seconds, from the builds of the same method at lower orders.
 
-    The time grows by a factor from each order to the next; for compositions it is constant, since their code has the
-    same length at all orders, apart from the table of stages. The result is 0 if no lower order was built.
+    The time grows by a factor from each order to the next. For compositions the time is constant, since their code has
+    the same length at all orders, apart from the table of stages. The result is 0 if no lower order was built.
     """
     timings = sorted((c.order, c.seconds) for c in tried_curves if c.setting and c.setting.family == setting.family)
     lower_timings = [(order, seconds) for order, seconds in timings if order < setting.order]
