@@ -49,10 +49,10 @@ def lattice_figure(
 ) -> Figure:
     """Return a figure of the coordinates over space and time, and of the ``errors`` (frames,) by quantity.
 
-    If time, forces or noise change the energy, H(t) is drawn instead of its error. For systems of pairs, the paths in
-    the plane of the first two coordinates are drawn. ``site_names`` are names of the sites of graphs and pairs. Further
-    panels show observables over time, the dynamic structure factor S(q, ω), a correlation, and Lyapunov exponents, if
-    the run has them. A diagram has at most ``dots`` dots along the time axis.
+    If time, forces or noise change the energy, H(t) is drawn instead of the energy error. For systems of pairs, the
+    paths in the plane of the first two coordinates are drawn. ``site_names`` are names of the sites of graphs and
+    pairs. If the run has observables, the dynamic structure factor S(q, ω), a correlation or Lyapunov exponents,
+    further panels show them. A diagram has at most ``dots`` dots along the time axis.
     """
     from matplotlib.figure import Figure
 

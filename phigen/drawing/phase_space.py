@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 #: Largest number of coordinates with separate panels; more coordinates are drawn as one image over time.
 MOST_COORDINATES = 24
-#: Points are drawn as dots, not joined by a line, if the typical angle between successive chords exceeds TURN, since
-#: the line would not show the orbit. For long curves the limit is FINE_TURN, since their chords would cover the panel.
+#: Points are drawn as dots if the typical angle between successive chords exceeds TURN, since a line would not show the
+#: orbit. For long curves the limit is FINE_TURN, since the chords of a long curve would cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
 #: A curve is long if its length is at least this multiple of the size of its panel.
 LONG = 60.0
-#: Elevation of the view in space, and azimuths to choose from, in degrees; the first azimuth is the default. A curve is
-#: drawn in BANDS parts by distance from the viewer; the farther parts are paler.
+#: ELEVATION: elevation of the view in space. AZIMUTHS: azimuths to choose from; the first is the default. Angles are in
+#: degrees. BANDS: a curve is drawn in this number of parts by distance from the viewer; the farther parts are paler.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
-#: Zoom of a box in space in a small panel; in large panels the zoom is larger.
+#: Zoom of a box in space in a small panel. The zoom in large panels is larger.
 SMALL = 0.76
 
 

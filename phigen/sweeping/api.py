@@ -64,8 +64,8 @@ def sweep(
     ``progress`` receives the numbers of computed and of failed members after each chunk.
 
     The function starts processes, so scripts that call it need the guard ``if __name__ == "__main__":``. Raises
-    `SpecError`, `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and
-    `PhigenError`.
+    `MissingPackageError` if dask, distributed, xarray or zarr is missing; `SpecError`; ``phigen.errors.FileError`` if
+    the store contains another sweep; and other errors of the class `PhigenError`.
     """
     from phigen.sweeping.store import imported
     from phigen.sweeping.sweep import SweepSetting, made
@@ -106,9 +106,9 @@ def _run_of(
     steps: int | None,
     parameters: Mapping[str, float] | None,
 ) -> Run:
-    """Return the run to repeat: the run of the spec, in which arguments of the call have replaced settings.
+    """Return the run to repeat: a run of the spec, with the arguments of the call in place of its settings.
 
-    ``name`` is the name of the sweep, ``run`` that of the run; by default the run is the one of the sweep.
+    ``run`` is the name of the run; the default is the run of the sweep ``name``.
     """
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()), None)
     run = run or (sweep.run if sweep else next(iter(spec.runs), None))

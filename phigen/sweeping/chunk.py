@@ -69,7 +69,9 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _exclusive_lock(name: str) -> Iterator[None]:
-    """Return a context that only one process of this machine at a time can enter; ``name`` is that of the lock."""
+    """Return a context that only one process of this machine at a time can enter. Locks are distinguished by
+    ``name``.
+    """
     try:
         import fcntl
     except ImportError:  # Windows has no fcntl: several processes may compile the solver at the same time
@@ -160,7 +162,7 @@ def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str
 
 
 def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
-    """Return for each member the number of crossings of the section, in the direction that the run states."""
+    """Return, for each member, how often it crosses the section in the direction that the run states."""
     section, time, signs = job.section()
     room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
     counts = np.zeros(len(members))

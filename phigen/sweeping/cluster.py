@@ -61,8 +61,8 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
 def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:
     """Compute the chunks with the numbers ``chunks`` of a store; ``slots`` is the number of threads of the workers.
 
-    Raises `SweepError` if workers die, the connection is lost, or a chunk cannot be stored; other exceptions in a
-    worker are raised again.
+    Raises `SweepError` if workers die, if the connection is lost, or if a chunk cannot be stored. Other exceptions of
+    workers are raised again in this process.
     """
     distributed = imported("distributed")
     tries = dict.fromkeys(chunks, 0)

@@ -28,8 +28,8 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
     """Return the number of members of a sweep whose stored energy error exceeds ``limit``, and the largest error.
 
     Errors are relative to the initial energy. If the terms of the initial energy nearly cancel, errors are relative to
-    the terms. Members that failed or are not computed yet are not counted. If time, forces or noise change the energy,
-    no member is counted.
+    the sum of their absolute values. Members that failed or are not computed yet are not counted. If time, forces or
+    noise change the energy, no member is counted.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:

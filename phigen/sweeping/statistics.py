@@ -16,8 +16,7 @@ from phigen.spec.names import STATISTICS
 from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
-#: Largest memory in bytes for the states of the members that are integrated at once. Members are divided into groups
-#: accordingly.
+#: Members are integrated in groups. This is the largest memory, in bytes, for the states of a group.
 MOST_BYTES = 64 * 2**20
 
 

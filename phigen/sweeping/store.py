@@ -32,7 +32,7 @@ WAITING = 255
 
 _SOLVER_DATA = "made_by"
 
-#: Names of arrays of a store that varied quantities must not have.
+#: Names that varied quantities must not have, since other arrays of the store have them.
 OWN = ("status", "coordinate", "frame", "frames", _SOLVER_DATA)
 
 
@@ -45,8 +45,8 @@ def imported(name: str) -> Any:
 class Job:
     """Opened store of a sweep, with all that a worker process needs to compute chunks.
 
-    ``root`` is the Zarr group, ``interface`` and ``files`` are those of the solver, ``functions`` is the source of a
-    NumPy module with energy, Casimirs and observables, ``spec`` the text of the spec.
+    ``root`` is the Zarr group. ``interface`` and ``files`` belong to the solver. ``functions`` is the source of a NumPy
+    module with energy, Casimirs and observables. ``spec`` is the text of the spec.
     """
 
     root: Any
@@ -95,9 +95,7 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash of the solver and of the plan, which identifies the results. The division into chunks is
-    left out.
-    """
+    """Return a hash that identifies results: of the solver, and of the plan without its division into chunks."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 

@@ -47,7 +47,7 @@ _LEAST, _MOST = 32, 1 << 17
 class SweepSetting:
     """Where and how a sweep is computed: the store ``output``, the workers, and options of the solver.
 
-    ``target`` replaces the target that the sweep states; None leaves it.
+    If ``target`` is None, the target of the sweep is used.
     """
 
     output: Path
@@ -63,9 +63,9 @@ class SweepSetting:
 class Outcome:
     """Result of a call that computes a sweep.
 
-    ``members`` and ``failed`` are the numbers of members that were computed, and that failed, in this call. The other
-    fields describe the whole sweep: ``size`` is the number of its members, ``dims`` has the sizes of its dimensions,
-    ``energy`` describes its members with large energy errors.
+    ``members`` is the number of members that this call has computed, ``failed`` the number of those that failed. The
+    other fields describe the whole sweep. ``size`` is the number of its members, and ``dims`` has the sizes of its
+    dimensions. ``energy`` describes the members with large energy errors.
     """
 
     members: int
@@ -227,7 +227,9 @@ def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str,
 def _gone_on_with(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> store.Job:
-    """Return the existing store ``output``, which is continued. Raises `FileError` if it contains another sweep."""
+    """Return the existing store ``output``, so that it is continued. Raises `FileError` if it contains another
+    sweep.
+    """
     job = store.open_job(str(output))
     if phrases := differences(job, plan, solver, spec, listed):
         message = f"{output} holds another sweep: {'; '.join(phrases)}"

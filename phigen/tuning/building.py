@@ -41,10 +41,10 @@ _GRACE = 2.0
 class Built:
     """A compiled candidate, with its generated files and the properties of its method.
 
-    ``kind`` is the chosen kind of bi-realisation or scheme. ``order`` may exceed that of the setting, since symmetric
-    methods have even order. ``exact`` says that a step is a Poisson map to round-off, ``gauged`` that the solver
-    subtracts multiples of Casimirs from H. ``stages`` is the number of maps of which a step is composed, ``seconds``
-    the time of the build.
+    ``kind`` is the chosen kind of bi-realisation or scheme. ``order`` may be larger than the order of the setting,
+    since symmetric methods have even order. ``exact`` says that a step is a Poisson map to round-off. ``gauged`` says
+    that the solver subtracts multiples of Casimirs from H. ``stages`` is the number of maps of which a step is
+    composed, ``seconds`` the time of the build.
     """
 
     setting: Setting
@@ -74,8 +74,8 @@ class Built:
 class Refusal:
     """The reason why a candidate cannot be built.
 
-    ``inapplicable`` says that the method does not apply to the system; otherwise the code would be too large, or the
-    build would take too long. ``seconds`` is the time that the attempt took.
+    ``inapplicable`` says that the method does not apply to the system. If it is False, the code would be too large, or
+    the build would take too long. ``seconds`` is the time that the attempt took.
     """
 
     reason: str

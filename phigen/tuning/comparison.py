@@ -41,12 +41,12 @@ Notify = Callable[[str], object]
 
 @dataclass(frozen=True)
 class ComparedMethod:
-    """Results of one method of a comparison; ``refusal`` is the reason why there are none, "" if there are results.
+    """Results of one method of a comparison. If there are none, ``refusal`` is the reason, else "".
 
-    ``error`` and ``casimirs`` are the largest errors of energy and Casimirs along the run, ``orbit`` is the largest
-    distance from the reference solution, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Unknown results are None. A step
-    takes ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by construction, ``own`` whether the method
-    is the setting of the spec.
+    ``error`` and ``casimirs`` are the largest errors of energy and Casimirs along the run. ``orbit`` is the largest
+    distance from the reference solution. ``defect`` is the residual of DΦ π DΦᵀ = π∘Φ. Unknown results are None.
+    ``nanoseconds`` is the time of a step. ``poisson`` says whether a step is a Poisson map by construction, ``own``
+    whether the method is the setting of the spec.
     """
 
     title: str
@@ -175,7 +175,8 @@ def _measured(
 ) -> ComparedMethod:
     """Measure a method with a step size of about ``h`` over the whole run.
 
-    ``exact`` computes the reference solution, within ``seconds``; None if there is no reference.
+    ``exact`` is the method that computes the reference solution, None if there is no reference. It may take
+    ``seconds``.
     """
     unmeasured = ComparedMethod(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
     if not math.isfinite(h):

@@ -1,12 +1,13 @@
 """Search for a monitor for a spec without one.
 
-A monitor is a positive function g of the state. Steps of equal size in the time τ, where dt = g dτ, are then shorter
-in t where g is small.
+A monitor is a positive function g of the state. Steps of equal size in the time τ, where dt = g dτ, are then shorter in
+t where g is small.
 
-Candidates are powers of the distances in denominators, roots and logarithms of H, powers of the speed |π∇H|, and
-``log`` if H splits into two parts. The gain of a monitor is the ratio of the numbers of steps without and with it, over
-the same time, with the same order and energy error. The step for this error is found by halving, and then by
-interpolation between two of the steps.
+Candidates are made from expressions in H that resemble distances: denominators, and arguments of roots and logarithms.
+Further candidates are made from the state and from the speed |π∇H|. If H splits into two parts, ``log`` is a candidate
+too. Runs without and with a monitor are compared over the same time, with the same order and energy error. The gain of
+a monitor is the ratio of their numbers of steps. The step size for the requested error is found by halving, and then by
+interpolation between two step sizes.
 """
 
 from __future__ import annotations
@@ -44,9 +45,9 @@ from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: exponents, in quarters, of the
-#: squares of distances, the most promising first. OF_SPEED: exponents, in quarters, of 1 + the scaled square of the
-#: speed.
+#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: candidates are squares of distances
+#: to these powers, in quarters, the most promising first. OF_SPEED: further candidates are 1 + the scaled square of the
+#: speed to minus these powers, in quarters.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
@@ -56,8 +57,8 @@ MOST_LETTERS = 160
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25
-#: HALVINGS: largest number of halvings of a step. MOST: largest number of steps of a run with a monitor, as a multiple
-#: of the number of steps without one.
+#: HALVINGS: largest number of halvings of a step. MOST: a run with a monitor may have this number of times the steps of
+#: the run without one.
 HALVINGS, MOST = 30, 64
 
 
@@ -150,9 +151,10 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 
 
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
-    """Return the quotient of the smallest value of ``b`` along the motion and its median.
+    """Return the smallest value of ``b`` along the motion, divided by the median of its values.
 
-    The quotient is small for a distance that becomes small in close encounters. Bases with small quotients come first.
+    The quotient is small for a distance that becomes small in close encounters. Expressions with small quotients are
+    tried first.
     """
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))
@@ -239,8 +241,8 @@ def _trial(
 ) -> Trial:
     """Return the result of a candidate: the fewest steps with an energy error of at most ``accuracy``.
 
-    The step is halved until the error is small enough. Then a run is made with a step between the last two,
-    interpolated from their errors; it counts if its error is small enough.
+    The step is halved until the error is small enough. The last two step sizes are interpolated by their errors, and a
+    run is made with the step size between them. Its result is returned if its error is small enough.
     """
     solver = Solver(candidate.solver(), candidate.interface)
     h, previous = _largest(solver, problem, states), (math.nan, math.inf)
@@ -260,7 +262,7 @@ def _trial(
 
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
-    """Return the largest step that still resolves the fastest rotation at some states of the motion."""
+    """Return the largest step that still resolves the fastest oscillation near some states of the motion."""
     moving = motion(solver.backend, problem.parameters, monitored=solver.interface.monitored)
     return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
 

@@ -24,8 +24,8 @@ from phigen.tuning.settings import Setting, charts
 
 #: Largest number of states at which the energy of one run is evaluated.
 ROWS = 8_000
-#: Relative change of the energy by the rounding error of one step, in double and in single precision. Over n steps,
-#: rounding errors add up to about √n times this, as a random walk.
+#: Relative change of the energy by the rounding error of one step, in double and in single precision. After n steps the
+#: change is about √n times larger, as in a random walk.
 ROUNDING, SINGLE_ROUNDING = 1.1e-16, 6e-8
 
 
@@ -33,10 +33,10 @@ ROUNDING, SINGLE_ROUNDING = 1.1e-16, 6e-8
 class Problem(ABC):
     """A tuning problem: initial state, parameters, step and duration of the run on which methods are measured.
 
-    Searches begin with the size ``step``; ``horizon`` is the duration. Steps and times are positive here; ``direction``
-    is −1 for a run backwards in time. ``sizes`` are the sizes of a lattice, () for other systems. Times are values of
-    the ``clock``, t or τ. It is τ if the spec has a monitor; then all methods make steps in τ. ``rounding`` is the
-    relative rounding error of one step of phigen's solvers.
+    The search begins with steps of size ``step``. ``horizon`` is the duration of the run. Steps and times are positive
+    here; ``direction`` is −1 for a run backwards in time. ``sizes`` are the sizes of a lattice, () for other systems.
+    ``clock`` is the variable of all times: τ if the spec has a monitor, else t. All methods make steps of equal size in
+    this variable. ``rounding`` is the relative rounding error of one step of phigen's solvers.
     """
 
     start: Floats

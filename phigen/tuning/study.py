@@ -68,10 +68,10 @@ class Tuning:
     has the reasons why other candidates were not measured. ``finished`` says that all promising candidates were
     measured.
 
-    If the energy error is the ``measure``, ``orbit_error`` is the error of the orbit of the best finalist over
-    ``piece``; None if it is unknown. ``unit`` is the unit of energy errors. ``monitors`` has the gains of monitors, if
-    the spec has none and the speed of the motion varies much. ``sizes`` are the sizes of the measured lattice, () for
-    other systems. Times are values of the ``clock``, t or τ.
+    ``measure`` is the measured error: energy or orbit. If it is energy, ``orbit_error`` is the orbit error of the best
+    finalist over ``piece``, None if unknown. ``unit`` is the unit of energy errors. ``monitors`` has the gains of
+    monitors, None if no monitor was tried. ``sizes`` are the sizes of the measured lattice, () for other systems. Times
+    are values of the ``clock``, t or τ.
     """
 
     measure: str
