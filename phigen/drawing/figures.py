@@ -108,7 +108,7 @@ def work_precision_figure(study: Study) -> Figure:
 def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
     """Return a figure of errors over computing time for all settings that a tuning has tried.
 
-    Stars mark the proposals.
+    Stars mark the proposed steps.
     """
     figure = _figure(1.2 * _SQUARE, WIDTH)
     if title:

@@ -123,7 +123,7 @@ def _directions(azimuth: float) -> Floats:
 def _azimuth(centred: Floats) -> float:
     """Return the azimuth of a view in which the curve is not seen edge-on.
 
-    This is the default azimuth, unless the curve has a much larger area in another view.
+    The default azimuth is returned, unless the curve has a much larger area in another view.
     """
     spread = centred.T @ centred
 
@@ -156,7 +156,7 @@ def _draw_faded(
 def _draw_curve(
     axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, as_curve: bool
 ) -> None:
-    """Draw points as a line; if ``as_curve`` is false, as dots."""
+    """Draw points as a line, or as dots if ``as_curve`` is False."""
     if as_curve:
         axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
         return

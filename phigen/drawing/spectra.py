@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from phigen.runtime.spectra import Correlation, DynamicSpectrum
 
-#: Number of decades that are shown below the largest value. Smaller values come from rounding, and from the window
-#: function, which spreads large values over other frequencies.
+#: Number of decades that are shown below the largest value. Smaller values are not meaningful: they come from rounding,
+#: or from the window function, which spreads large values over other frequencies.
 DECADES = 6
 
 
@@ -32,7 +32,7 @@ def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
 
 
 def draw_correlation(axes: Any, correlation: Correlation) -> None:
-    """Draw the correlation of two fields over the distance of the sites."""
+    """Draw the correlation of two fields against the distance between the sites."""
     axes.plot(np.arange(len(correlation.values)), correlation.values, ".-", linewidth=1.0)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.set(

@@ -32,8 +32,8 @@ LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
 #: Step size and number of steps of the run for the Poincaré section. With this step size RK4 drifts visibly.
 COARSE, SECTION_STEPS = 0.004, 75_000
-#: _REST: number of further steps after which RK4 has come to rest at an equilibrium. _DOTS: number of crossings that
-#: are drawn.
+#: _REST: number of further steps after which RK4 has come to rest at an equilibrium. _DOTS: number of crossings of the
+#: section that are drawn.
 _REST, _DOTS = 10**6, 500
 
 
@@ -131,7 +131,7 @@ def _draw_errors(methods: dict[str, Trajectory], zoom: Trajectory) -> Figure:
 
 
 def section_plate() -> Plate:
-    """Return the figure of a trajectory with its Poincaré section, and of the sections of both methods."""
+    """Return the figure of a trajectory of phigen, with the Poincaré sections of phigen and of RK4."""
     body = bodies()
 
     def height(states: Floats) -> Floats:

@@ -22,8 +22,8 @@ STEPS, STRIDE = 11, 4
 #: The step of a run is halved at most this number of times while the run fails. Runs start from few sites of a lattice,
 #: or at the end of the user's run. From these states the user's step size may be too large.
 HALVINGS = 6
-#: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to their
-#: terms. Both are exact up to rounding.
+#: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to the terms
+#: of the product. Gradient and product are exact up to rounding.
 TRANSPOSED = 1e-12
 #: Largest accepted difference between a gradient and finite differences of order 6. The errors of the finite
 #: differences are part of it. Below: the two displacements of the differences, in units of the displaced quantity.
@@ -154,7 +154,7 @@ def measured(
 def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> tuple[float, str]:
     """Return the largest value of ``error`` for the runs; infinity if a run fails or a value is not finite.
 
-    The second result says that a run fails, and why; "" if none does.
+    The second result is the reason why a run fails, "" if none fails.
     """
     largest = 0.0
     for run in runs:

@@ -15,7 +15,7 @@ from phigen.study.methods import size_of
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
-#: The step of the run is doubled up to COARSER times and halved up to FINER times, to obtain several step sizes.
+#: To obtain several step sizes, the step of the run is doubled up to COARSER times, and halved up to FINER times.
 COARSER, FINER = 6, 7
 #: ROUNDS: how often a time is measured; the shortest time counts. LEAST_SECONDS: least duration of a measurement, which
 #: may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
@@ -151,8 +151,8 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
     """Return the final states of runs up to the time ``end``, by their numbers of steps, in increasing order.
 
-    Larger numbers are left out when rounding dominates the error, or when a run takes longer than `MOST_SECONDS`. Runs
-    that fail, or whose error is as large as the solution, are left out too.
+    Numbers of steps are increased until rounding dominates the error, or until a run takes longer than `MOST_SECONDS`.
+    Runs that fail, or whose error is as large as the solution, are left out.
     """
     states: dict[int, Floats] = {}
     least, count = math.inf, 0

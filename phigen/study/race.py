@@ -35,7 +35,7 @@ TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]
     "dop853": (dop853.A[1:], dop853.B),
 }
 
-#: Function of (h, steps, repetitions) that repeats a run, and returns its final state, or None if a step fails.
+#: Function of (h, steps, repetitions). It repeats a run, and returns the final state, or None if a step fails.
 Runner = Callable[[float, int, int], Floats | None]
 
 

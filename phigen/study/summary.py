@@ -23,8 +23,8 @@ WINDOWS = 10
 
 #: Entry for the largest error in a window without rows.
 _NOTHING = -1.0
-#: Windows are compared only if the first window contains an oscillation of each coordinate that oscillates. The
-#: coordinate must have at least this number of turning points in the window.
+#: Windows are compared only if each coordinate that oscillates has at least this number of turning points in the first
+#: window.
 _TURNS = 2
 
 
@@ -44,12 +44,12 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method in a run with ``rows`` rows. The first ``good`` rows are finite; only they are evaluated.
+    """Errors of one method in a run with ``rows`` rows. Only the first ``good`` rows are evaluated: they are finite.
 
-    ``exact`` is the largest error against the closed form, None if there is none. If the method fails in its first
-    step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H − work; ``work``
-    is the work at the end, with an error of about ``off`` in the unit of the energy, and ``change`` is the largest
-    change of H.
+    ``exact`` is the largest error against the closed form, None if the run states no closed form. If the method fails
+    in its first step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H −
+    work, and ``change`` is the largest change of H. Then ``work`` is the work at the end, with an error of about
+    ``off`` in the unit of the energy.
     """
 
     method: str
@@ -270,7 +270,10 @@ def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
 def exact_solution(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
 ) -> dict[str, Floats]:
-    """Return the values at the times ``t`` of the coordinates for which the run states a closed form, by coordinate."""
+    """Return the closed form of the run at the times ``t``, as arrays by coordinate.
+
+    Coordinates without a closed form are left out.
+    """
     values: dict[str, Any] = {ELAPSED: t, **parameters}
     values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
     arrays = evaluate(list(run.exact.values()), values)
