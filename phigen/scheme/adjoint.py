@@ -1,13 +1,13 @@
-"""The transpose of a step: kernels that compute the cotangents of its inputs from those of its results, by reverse
-accumulation.
+"""The transpose of a step: kernels that compute the cotangents of its inputs from the cotangents of its results, by
+reverse accumulation.
 
 The cotangent of the new state x' determines the cotangents of the old state x and of the coefficients of the step. The
 cotangents of the coefficients are summed over the steps of a run. At the end of the run the transpose of ``prepare``,
 which computes the coefficients from the parameters, is applied once.
 
-Each kind of step has its formulas. *newton*: the step solves y + a(y) = x for y, and x' = x + d(y). Let J = 1 + a' and
-M = d' be the matrices that the kernel ``linearise`` computes. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the
-cotangent of x is λ + μ. The cotangent of a coefficient is the derivative of λ·d − μ·a with respect to this coefficient.
+Each kind of step has its formulas. *newton*: the step solves y + a(y) = x for y, and x' = x + d(y). The kernel
+``linearise`` computes the matrices J = 1 + a' and M = d'. Let λ be the cotangent of x', and μ = J⁻ᵀ Mᵀ λ. The cotangent
+of x is λ + μ. The cotangent of a coefficient is the derivative of λ·d − μ·a with respect to this coefficient.
 *explicit* steps and flows: one reverse sweep over their formulas. *path*: see `adjoint_path`. *gauss*: see
 `gauss_adjoint`.
 """
@@ -46,11 +46,12 @@ def pulled_back(
     variables: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """Return the kernel of the derivatives of Σ cotangent · value with respect to some inputs of a kernel.
+    """Return the kernel that computes cotangents of some inputs of a kernel from the cotangents of its values.
 
-    ``seeds`` maps the name of each new input to the values whose cotangents this input holds; the sum runs over all
-    these values. ``variables`` maps the name of an input array to its symbols; for an array ``x`` the new kernel has
-    the output ``x_bar``, the cotangents of its symbols. ``purpose`` is the comment in the generated code.
+    ``seeds`` lists the values: it maps the name of a new input to the values whose cotangents this input holds.
+    ``variables`` maps the name of an input array to its symbols. For an array ``x`` the new kernel has the output
+    ``x_bar``: the derivatives of Σ cotangent · value, summed over all values, with respect to the symbols of ``x``.
+    ``purpose`` is the comment in the generated code.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
@@ -78,11 +79,11 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the cotangents of the coefficients of a Newton step, at the solution y of its
-    equation.
+    """Return the kernel that computes the cotangents of the coefficients of a Newton step.
 
-    Its inputs are λ, the cotangent of the new state x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ
-    (``displacement_bar``). J is the Newton matrix, and M the derivative of the increment x' − x with respect to y.
+    The kernel is evaluated at the solution y of the implicit equation. Its inputs are λ, the cotangent of the new state
+    x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ (``displacement_bar``). J is the Newton matrix, and M the
+    derivative of the increment x' − x with respect to y.
     """
     displacement, increment, *_ = linearise.outputs
     kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})
@@ -96,7 +97,8 @@ def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
 
 
 def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "explicit_adjoint") -> Kernel:
-    """Return the kernel of the cotangents of the state and of the coefficients, for an explicit step or a flow.
+    """Return the kernel that computes the cotangents of the state and of the coefficients, for an explicit step or a
+    flow.
 
     The kernel reads the cotangent of the increment of the state.
     """
@@ -115,9 +117,10 @@ def gauss_adjoint(
 ) -> list[Kernel]:
     """Return three kernels that together transpose a Gauss step.
 
-    The step has the stages Z_i = Σ_j μ_ij L_j with the stage increments L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j
-    L_j). Let λ be the cotangent of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i
-    (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations.
+    In a step with the weights w_j and the coefficients μ_ij, the stages Z_i solve Z_i = Σ_j μ_ij L_j with the
+    increments L_j = w_j f(x, Z_j). The new state is x' = x + D(x, Σ_j L_j). Let λ be the cotangent of x', and ε =
+    (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j.
+    Fixed-point sweeps solve these equations.
 
     The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes the contribution of
     one stage to the cotangents of x and of the coefficients. The third kernel is the transpose of D.
@@ -147,12 +150,11 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """Return the transpose of a whole step; ``steps`` are the transposed kernels of the step without its
-    coefficients.
+    """Return the transpose of a whole step, including the computation of its coefficients.
 
-    This function adds the transposes of ``prepare``, which computes coefficients before the steps, and of ``refresh``,
-    which computes the coefficients that change from step to step. Both kernels must be built before, with the full
-    table of coefficients.
+    ``steps`` are the transposed kernels of the step itself. This function adds the transposes of ``prepare``, which
+    computes coefficients before the steps, and of ``refresh``, which computes the coefficients that change from step to
+    step. Both kernels must be built before, with the full table of coefficients.
     """
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
@@ -193,13 +195,13 @@ def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]
 
 
 def _constant_coefficients(coefficients: Coefficients, differentiated: Mapping[str, Sequence[str]]) -> list[bool]:
-    """Return, for each coefficient, whether it is independent of all inputs that are differentiated."""
+    """Return for each coefficient whether it is independent of all ``differentiated`` symbols."""
     names = {s for symbols in differentiated.values() for s in symbols}
     return [names.isdisjoint(symbols_of(e)) for e in coefficients.written_out(coefficients.everything)]
 
 
 def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
-    """Return a transposed kernel that outputs 0 as the cotangent of each coefficient that is marked as ``constant``."""
+    """Return a transposed kernel with the cotangents of the coefficients marked as ``constant`` replaced by 0."""
     outputs = [
         replace(o, values=tuple(ZERO if is_constant else e for e, is_constant in zip(o.values, constant, strict=True)))
         if o.name == f"{TABLE}_bar"
@@ -210,9 +212,10 @@ def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
 
 
 def level_adjoint(system: System) -> Kernel:
-    """Return the kernel of the gradient of H with respect to state and parameters, for the transpose of e = −H(x₀).
+    """Return the kernel of the gradient of H with respect to the state and the parameters.
 
-    e is the energy level that a monitored system adds to H.
+    The reverse pass of a monitored system needs this gradient, because the energy level e = −H(x₀) depends on the start
+    x₀ and on the parameters.
     """
     variables = [*system.coordinates, *system.parameter_names]
     slopes = gradient(system.hamiltonian, variables)
@@ -228,11 +231,12 @@ def level_adjoint(system: System) -> Kernel:
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
     """Return the transpose of a step along a path ṁ = π(m)p.
 
-    It consists of recurrences, which follow the path backwards together with its cotangents, and of the transpose of
-    ∇S_h with respect to the coefficients. Let λ be the cotangent of the new state x' = m(1), and ν the cotangent of the
-    mean y = ∫ m dt. In reversed time along the path, ȧ = ∂(π(m)p)/∂mᵀ a + ν, with the initial value a = λ. The
-    cotangent of x is the final value of a; that of p is ∫ π(m)ᵀ a dt; that of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt.
-    Since p = ∇S_h(y), ν = Hess S_hᵀ ω, where ω is the cotangent of p. This results in a linear equation for ω.
+    The transpose consists of two things: recurrences that follow the path backwards, together with cotangents; and the
+    transpose of ∇S_h with respect to the coefficients. Let λ be the cotangent of the new state x' = m(1), and ν the
+    cotangent of the mean y = ∫ m dt. The cotangent a of m starts at a = λ. It satisfies ȧ = ∂(π(m)p)/∂mᵀ a + ν, if time
+    runs backwards along the path. The cotangent of x is the final value of a, and the cotangent of p is ω = ∫ π(m)ᵀ a
+    dt. The cotangent of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt. Since p = ∇S_h(y), ν = Hess S_hᵀ ω. This results in a
+    linear equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

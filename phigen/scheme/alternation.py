@@ -1,12 +1,14 @@
-"""Splitting methods for any number of parts of H: they alternate χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ … ∘
-φ_m, where φ_k is the flow of part k over the time h.
+"""Splitting methods for any number of parts of H.
 
-A step is Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i}. It is a symmetric Poisson
-map if the φ_k are exact flows. A splitting method for two parts has the coefficients a_1 = α_1, b_1 = α_1 + α_2, a_2 =
-α_2 + α_3, …; if it has some order, the α give the same order for any number of parts: R. I. McLachlan, On the numerical
-integration of ordinary differential equations by symmetric composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ
-and χ* meet, two successive flows of one part are merged. Strang's splitting is α = (½, ½). A symmetric composition of
-Strang's splitting has α = (γ_1/2, γ_1/2, γ_2/2, γ_2/2, …).
+Let φ_k be the flow of part k over the time h. The methods alternate χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ …
+∘ φ_m: a step is Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i}. It is a symmetric
+Poisson map if the φ_k are exact flows. Strang's splitting is α = (½, ½). A symmetric composition of Strang's splitting
+has α = (γ_1/2, γ_1/2, γ_2/2, γ_2/2, …).
+
+A splitting method for two parts has the coefficients a_1 = α_1, b_1 = α_1 + α_2, a_2 = α_2 + α_3, …. The α give the
+same order for any number of parts: R. I. McLachlan, On the numerical integration of ordinary differential equations by
+symmetric composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ and χ* meet, two successive flows of one part are
+merged.
 """
 
 from __future__ import annotations
@@ -93,14 +95,15 @@ class Schedule:
     """The order and the durations of the flows of one step, in units of the step size.
 
     A step begins with the flow of part 0 over ``times[0]``. Then ``stages`` repetitions of the ``pattern`` follow. The
-    pattern lists pairs of a part and a row: the flow of this part runs for the time in this row of ``times``. The rows
-    of the pattern count from the first row of the stage.
+    pattern lists pairs of a part and a row: the flow of this part runs for the time in this row of ``times``. In the
+    pattern, rows are counted from the first row of the stage.
 
-    A kick with modified potential has its coefficient, in units of h², in its row of ``multiples``; other flows have 0
-    there. If H depends on the time, ``moments`` has, for each row, the fraction of the step at which H is evaluated.
+    Some methods replace V, one of two parts, by a modified potential V + κ{V, {V, T}} with κ = m h². Then ``multiples``
+    has the number m for each row; m is 0 for flows without a modified potential. If H depends on the time, ``moments``
+    has for each row the fraction of the step at which H is evaluated.
 
-    If the method has a corrector, a run starts with the flows ``begin`` and ends with the flows ``end``; the rows of
-    these flows follow the rows of the step.
+    If the method has a corrector, a run starts with the flows ``begin`` and ends with the flows ``end``. Their rows
+    follow the rows of the step.
     """
 
     times: tuple[float, ...]
@@ -133,9 +136,9 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
     """Return the schedule for an H that depends on the time, with the time at which each flow evaluates H.
 
     The times are fractions of the step. The time advances during the flows of one part, and is fixed during all other
-    flows. This part has the number ``carrier``, and is the first or the last part. The Hamiltonian is H + e, where e is
+    flows. This part has the number ``carrier``; it is the first or the last part. The Hamiltonian is H + e, where e is
     the conjugate of the time, and e belongs to this part. If ``carrier`` equals ``parts``, the number of parts of H,
-    the time advances in a flow of e alone, which is left out of the result.
+    then e is a part by itself. The result omits the flows of this part, since they only advance the time.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:

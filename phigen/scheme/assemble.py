@@ -181,10 +181,10 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel ``prepare``, which computes the coefficients: all values that depend on parameters and step
-    size only.
+    """Return the kernel ``prepare``, which computes the coefficients.
 
-    It must be built last, when the table of coefficients is full.
+    Coefficients are values that depend on parameters and step size only. The kernel must be built last, when the table
+    of coefficients is full.
     """
     return Kernel(
         "prepare",
@@ -217,7 +217,7 @@ def _facts(
 
 
 def approximation(realisation: BiRealisation) -> list[str]:
-    """Return the header line for a bi-realisation that is a truncation; no line for an exact one."""
+    """Return the header line that says how a bi-realisation is truncated; [] if it is exact."""
     if realisation.exact:
         return []
     degree = realisation.degree

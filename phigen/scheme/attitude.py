@@ -30,8 +30,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Description, in generated code, of the last entry of an output: a bound for the square of the norm of a matrix P = Σ
-#: p_i E_i with basis matrices E_i. The other entries of the output are the components p_i.
+#: Some outputs have the components p_i of a matrix P = Σ p_i E_i with basis matrices E_i, and in the end a bound for
+#: the square of the norm of P. This is the comment on the bound in generated code.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
@@ -109,9 +109,10 @@ def _path_element_kernel(group: Group, system: System) -> Kernel:
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
-    """Return the group element of the covector p, minus 1: its exponential, or its Cayley transform if ``cayley``.
+    """Return the group element of the covector p, minus 1.
 
-    If it is the exponential of a matrix, the generated code computes it later; the result is then p and a bound for the
+    The group element is the exponential of p, or the Cayley transform of p if ``cayley``. The exponential of a matrix
+    is not computed here, but later by the generated code. In this case the result is p, followed by a bound for the
     squared size of the matrix.
     """
     if not group.matrices:
@@ -139,11 +140,12 @@ def flow_attitude(
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """Return the attitude of a splitting: for each flow, a kernel of its increments and of the group element after it.
+    """Return the attitude of a splitting.
 
-    ``increments`` has first the increments of the flows of the noise sources, then those of ``flows``. With a monitor,
-    ``time_of`` returns the physical time of a flow. The coefficients of the kernels are added to ``coefficients``.
-    Raises the errors of `turnings`.
+    It has one kernel for each flow, which computes the increments of the flow and the group element of the step up to
+    the end of this flow. ``increments`` has first the increments of the flows of the noise sources, then those of
+    ``flows``. With a monitor, ``time_of`` returns the physical time of a flow. The coefficients of the kernels are
+    added to ``coefficients``. Raises the errors of `turnings`.
     """
     flow_rotations = turnings(system, group, flows, put_back=uniform(system))
     noise_rotations = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
@@ -165,15 +167,15 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols of the entries of the group element, minus 1, of all flows since the start of the step."""
+    """Return the symbols for the entries of g − 1, where g is the group element of the step before the next flow."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 
 def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
-    """Return g − 1 for the group element g of a step after one more flow.
+    """Return g − 1, where g is the group element of a step after one more flow.
 
-    g is the product of the element before this flow, whose entries are symbols, and of the elements by which the flow
-    over ``time`` acts.
+    g is the product of two elements: the element before this flow, whose entries are symbols, and the element of the
+    flow over ``time``.
     """
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before
@@ -182,8 +184,8 @@ def _element_after_flow(system: System, group: Group, turning: Turning, time: Ex
 def uniform(system: System) -> bool:
     """Whether Casimirs in H rotate the body at a constant angular velocity.
 
-    The angular velocity is meant in the frame in which the momentum is constant. It is constant unless there are
-    forces, a monitor, or an H that depends on the time.
+    The velocity is that in the frame in which the momentum is constant. Forces, a monitor, or an H that depends on the
+    time make the velocity vary.
     """
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)
@@ -192,11 +194,11 @@ def uniform(system: System) -> bool:
 def rate_kernel(
     system: System, group: Group, gauge: Gauge, further_gradients: Sequence[Expression] = ()
 ) -> Kernel | None:
-    """Return the kernel of the gradient of Σ λ_c C_c + Σ f: the Casimirs that the gauge subtracts from H, with their
-    multiples, and the functions f in ``further_gradients``.
+    """Return the kernel of the gradient of all functions that are subtracted from H, or None if there are none.
 
-    Returns None if there are no such terms. Raises `SpecError` if there are terms and also a monitor or forces, since
-    the rotation by the Casimirs is then not uniform.
+    These functions are the Casimirs of the gauge, multiplied by their λ, and the functions in ``further_gradients``.
+    Raises `SpecError` if there are such functions together with a monitor or forces, since the rotation by the Casimirs
+    is then not uniform.
     """
     subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]

@@ -1,5 +1,6 @@
-"""Loops over the bonds of a site of a lattice: one loop serves both ends a and b of the bonds, if the formulas at the
-two ends differ only in the signs of parameters."""
+"""Loops over the bonds of a site of a lattice. The ends of a bond are called a and b. One loop serves both ends if the
+formulas at a and at b differ only in the signs of parameters.
+"""
 
 from __future__ import annotations
 

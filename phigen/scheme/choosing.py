@@ -1,9 +1,11 @@
-"""Choice of the composition of a splitting: by the order, the brackets of the parts of H, and the cost of their flows.
+"""Choice of the composition of a splitting: by the order, the brackets of the parts of H, and the cost of their
+flows.
 
-If H has two parts T and V with {V, {V, {V, T}}} = 0, the methods of `phigen.scheme.nystrom` apply. If also V + κ{V, {V,
-T}} has a flow, the methods with modified kicks apply too. The time that a method needs for a given accuracy is
-proportional to the cost of a step times error^{1/order}. Of the applicable methods, the one with the smallest product
-is chosen. All other splittings get the recommended method of `phigen.scheme.alternation`.
+If H has two parts T and V with {V, {V, {V, T}}} = 0, the methods of `phigen.scheme.nystrom` apply. Some of these
+methods need flows of V + κ{V, {V, T}} for numbers κ (*modified kicks*), and apply only if phigen can compute them. The
+time that a method needs for a given accuracy is proportional to the cost of a step times error^{1/order}. Of the
+applicable methods, the one with the smallest product is chosen. All other splittings get the recommended method of
+`phigen.scheme.alternation`.
 """
 
 from __future__ import annotations
@@ -37,10 +39,11 @@ FLOW_LATENCY = 12
 
 @dataclass(frozen=True)
 class ScheduledMethod:
-    """A method, with the parts of H in the order in which its steps apply their flows, including modified kicks.
+    """A method, with the parts of H in the order in which its steps apply their flows.
 
-    ``why`` is the reason of the choice, as text for the user. If H depends on the time, ``carrier`` is the number of
-    the part during whose flow the time advances; a number that no part has stands for a separate advance of the time.
+    If the method has modified kicks, their flow takes the place of the flow of V. ``why`` is the reason of the choice,
+    as text for the user. If H depends on the time, ``carrier`` is the number of the part during whose flow the time
+    advances. If no part has this number, the time advances separately, after all flows.
     """
 
     order: Order
@@ -62,11 +65,11 @@ class ScheduledMethod:
 
 
 class Host(Protocol):
-    """Protocol of specs and systems whose Hamiltonian is split; errors name places in the spec."""
+    """Protocol for specs and systems whose Hamiltonian is split; error messages need the ``locations``."""
 
     @property
     def locations(self) -> Mapping[tuple[Any, ...], Location]:
-        """The position in the spec file of each key, by the path of the key."""
+        """Map from the path of each key in the spec to the position of the key in the file."""
         ...
 
 
@@ -77,7 +80,7 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
     """
     if splitting.small is not None and _unsuited(system, splitting, splitting.small):
         splitting = replace(splitting, small=None)
-    if system.forces:  # with forces, no part of H can be the V of a Nyström method
+    if system.forces:  # with forces, Nyström methods do not apply
         choice = planned(system, splitting, requested, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
@@ -88,19 +91,19 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
 
 
 def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
-    """Whether methods for near-integrable systems H = A + εB do not apply; ``small`` is the index of the part εB.
+    """Whether methods for near-integrable systems H = A + εB do not apply; ``small`` is the index of εB.
 
-    They do not apply if forces add further flows, or if A depends on the time, since the conjugate of the time belongs
-    to A.
+    Forces exclude these methods, since they add further flows. An A that depends on the time excludes them too, since
+    the conjugate of the time belongs to A.
     """
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return all parts that can be the V of a Nyström method, for an H = T + V that depends on the time.
+    """Return the parts that can be V in H = T + V for a Nyström method, if H depends on the time t.
 
-    With the conjugate e of the time, T + e takes the place of T. So T must not depend on the time, and V must commute
-    with ∂V/∂t.
+    The conjugate e of the time is added to T, so that t advances in the flow of T + e. This requires that T does not
+    depend on t, and that V commutes with ∂V/∂t.
     """
     kicks_found = []
     for kick in kicks(system.frozen, splitting):
@@ -112,10 +115,10 @@ def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
 
 
 def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
-    """Return the method with its ``carrier``: the number of the part during whose flow the time advances.
+    """Return the method with its ``carrier``, the number of the part during whose flow the time advances.
 
-    This part is the first or the last one, and must not depend on the time. If every part depends on the time, the time
-    advances in a separate flow after the last part.
+    The carrier is the first or the last part, and must not depend on the time. If every part depends on the time, the
+    time advances in a separate flow after the last part.
     """
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
@@ -184,10 +187,9 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
 
 
 def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
-    """Return the method for H = A + εB with the flow of B + κ{B, {B, A}} in place of the flow of B, if the method
-    requires it.
+    """Return the method for H = A + εB with the flow of B modified, if the method requires this.
 
-    Raises `SpecError` if there is no such flow.
+    The modified flow is that of B + κ{B, {B, A}} with a number κ. Raises `SpecError` if phigen cannot compute it.
     """
     method = choice.method
     if not isinstance(method, Corrected) or not method.multiple:

@@ -1,4 +1,4 @@
-"""Collected polynomials: sums of monomials in variables that depend on the state, with coefficients that do not.
+"""Collected polynomials. Their variables depend on the state; their coefficients do not.
 
 The coefficients are expressions in parameters and step size. Differentiation only multiplies them by integers, or by
 the coefficients in the derivatives of function values such as sin(q). So a gradient and a Hessian are written with the
@@ -47,7 +47,7 @@ class Collected:
         return {m: c for m, c in result.items() if not c.is_zero}
 
     def cells(self, terms: Terms, j: int) -> int:
-        """Return the number of exponents that `derivative` would write; its time is proportional to this number."""
+        """Return the number of exponents that `derivative` would write, as a measure of its computing time."""
         wide = [len(row[j]) for row in self.slopes]
         return sum(wide[v] for m in terms for v in self._moving[j] if m[v]) * len(self.variables)
 
@@ -62,9 +62,9 @@ def collect(
 ) -> tuple[Collected, list[Terms]]:
     """Return a ring of collected polynomials, and the ``elements`` of a tower as polynomials of this ring.
 
-    A tower is a polynomial ring over the rationals with function values as variables. If ``times`` are symbols of the
-    time, the coefficients that depend on them are polynomials in time-dependent values, with coefficients that depend
-    on parameters only.
+    A tower is a polynomial ring over the rationals with function values as variables. ``times`` are symbols of the
+    time, if H depends on it. Then the coefficients may depend on the time; each is written as a polynomial in values
+    such as sin(t), whose own coefficients depend on parameters only.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
     static = [i for i in range(len(tower.names)) if i not in state and i not in dated]

@@ -63,9 +63,7 @@ _SOFRONIOU_SPALETTA_10 = (
 
 @dataclass(frozen=True)
 class Composition:
-    """A symmetric composition with its name and order; stage i is a step of the size γ_i h, where ``fractions`` are γ_1
-    … γ_s.
-    """
+    """A symmetric composition with name, order and ``fractions`` γ_1 … γ_s; stage i is a step of size γ_i h."""
 
     name: str
     order: int

@@ -1,17 +1,18 @@
-"""Symplectic correctors for near-integrable systems H = A + εB: a map C such that C φⁿ C⁻¹, with n simple steps φ, is
-more accurate than φⁿ.
+"""Symplectic correctors for near-integrable systems H = A + εB. A corrector is a map C for which C φⁿ C⁻¹, with n
+simple steps φ, is more accurate than φⁿ.
 
 A step is φ = e^{hA/2} e^{hεB} e^{hA/2}. To first order in ε, φ is the flow of A + ε f(z) B, where z = h ad_A and f(z) =
-(z/2)/sinh(z/2). The map C = e^{εhG}, with an odd series G = g(z) B, changes this to the flow of A + ε(f(z) − z g(z)) B.
-If z g(z) = f(z) − 1 up to z^{2k}, the error of first order in ε begins at εh^{2k+2}; the error ε²h² remains.
+(z/2)/sinh(z/2). Let C = e^{εhG}, with an odd series G = g(z) B. Then C φ C⁻¹ is the flow of A + ε(f(z) − z g(z)) B to
+this order. If z g(z) = f(z) − 1 up to z^{2k}, the error of first order in ε begins at εh^{2k+2}; the error ε²h²
+remains.
 
 C is a product of flows of A, B, A, B, A over the times c_i, −b_i, −2c_i, b_i, c_i, one such product for each i = 1, …,
 k. Then g(z) = Σ 2 b_i sinh(c_i z). For chosen c_i, the b_1, …, b_k solve a linear system. C is a Poisson map, as a
 product of exact flows.
 
-This C causes an error ε²h³, by the order in which it applies the flows of B. A *balanced* C avoids this error: it has
-each pair (c_i, b_i) with half of b_i, followed by the pairs (−c_i, −b_i/2) in reverse order, so the logarithm of C is
-odd in ε. The balanced C is used with steps that have B − h²{B, {B, A}}/24 in place of B, and hence no error ε²h².
+The order of the flows of B in this C causes an error ε²h³. A *balanced* C avoids this error. It is the product for the
+pairs (c_i, b_i/2), followed by the product for the pairs (−c_i, −b_i/2) in reverse order. Its logarithm is odd in ε.
+The balanced C is used with steps that have B − h²{B, {B, A}}/24 in place of B, and hence no error ε²h².
 
 J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute Communications 10 (1996); J. Wisdom, Symplectic
 correctors for canonical heliocentric n-body maps, Astronomical Journal 131 (2006).

@@ -1,5 +1,5 @@
-"""Discretisation of a system: by the generating function of the requested order for the whole step (the direct series),
-or by a composition of steps of order 2.
+"""Discretisation of a system. Two ways are compared: one generating function of the requested order for the whole step
+(the direct series), and a composition of steps of order 2.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ MOST_OPERATIONS = limits.OPERATIONS
 #: Part of the hint in errors about the size of a program: an alternative to a lower order.
 _ALTERNATIVE = "for scheme: splitting, "
 
-#: Cost of the gradient and the Hessian of S_h, in units of an addition, below which the direct series is chosen without
-#: computing a composition for comparison: the error of the direct series is smaller.
+#: If the gradient and the Hessian of S_h cost less than this number of additions, the direct series is chosen at once,
+#: and no composition is computed for comparison. The error of the direct series is smaller.
 MIN_COST_TO_COMPOSE = 2_000
 
 #: Largest accepted ratio of the costs of the direct series and of a composition. Up to this ratio the direct series is
 #: chosen, since its error constant is smaller.
 MAX_DIRECT_COST_RATIO = 4
 
-#: Largest number of terms S_1, S_2, … for which S_h is also tried as a graph of shared sub-expressions; with more
-#: terms, only collected polynomials are tried.
+#: Largest number of terms S_1, S_2, … for which phigen also tries to write S_h as a graph of shared sub-expressions.
+#: With more terms, only collected polynomials are tried.
 MAX_GRAPH_TERMS = 5
 
 
@@ -100,7 +100,11 @@ def generating_function(
 
 
 def push(system: System) -> list[Expression]:
-    """Return the terms of the covector p in addition to ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
+    """Return the terms that forces and noise add to ∇S_h in the covector p of a step.
+
+    A covector force ζ adds hζ. Noise adds σ∇g ΔW for each source, with the Hamiltonian g, the amplitude σ and the
+    increment ΔW of the source.
+    """
     covector = system.forces.covector if system.forces else [ZERO] * system.dimension
     return [symbol(STEP) * z + e for z, e in zip(covector, _noise(system), strict=True)]
 
@@ -115,10 +119,10 @@ def _noise(system: System) -> list[Expression]:
 
 @dataclass(frozen=True)
 class Discretisation:
-    """The generating function of a stage with its number of ``terms`` S_i, and the ``fractions`` of the step for its
-    stages.
+    """The generating function of a stage, and the sizes of the stages.
 
-    ``note`` is a line about the composition for the header of generated files, empty without a composition.
+    ``terms`` is the number of the S_i in the generating function. ``fractions`` are the sizes of the stages in units of
+    the step. ``note`` is a line about the composition for the header of generated files, empty without a composition.
     """
 
     generating: GeneratingFunction
@@ -150,7 +154,7 @@ def discretise(
         return _forced(system, realisation, series, order, composition, monitor)
     if not affordable:
         expect_affordable(system, realisation)
-    series.reach(order.order)  # a symmetric method has order k + 1 as S_{k+1} = 0; the proof needs this term
+    series.reach(order.order)  # a proof of the order k + 1 of a symmetric method with k terms needs S_{k+1} = 0
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
     can_compose = composition == "auto" and series.symmetric and find("auto", order.order) is not None
@@ -199,10 +203,10 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """Return the discretisation with forces, p = h(∇H + ζ).
+    """Return the discretisation with forces, p = h(∇H + ζ), where ζ is the covector force.
 
-    In a symmetric bi-realisation it has order 2, and higher orders by compositions. In any other bi-realisation it has
-    order 1.
+    With a symmetric bi-realisation, this step has order 2, and compositions of such steps have higher orders. With any
+    other bi-realisation the order is 1.
     """
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector force needs a bi-realisation in closed form, but {realisation.kind} follows paths"
@@ -243,13 +247,15 @@ def _composed(
 
 
 def is_large(system: System) -> bool:
-    """Whether S_1 = H may need too many operations for a system of this dimension, so that `expect_affordable` must
-    count them."""
+    """Whether a system of this dimension is so large that `expect_affordable` must count the operations for S_1 = H."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 
 def expect_affordable(system: System, realisation: BiRealisation) -> None:
-    """Raise `LimitError` if a step with S_1 = H alone needs too many operations; tested before S_2 is computed."""
+    """Raise `LimitError` if even a step with S_1 = H alone needs too many operations.
+
+    This test precedes the computation of S_2, which may take long.
+    """
     if not is_large(system):
         return
     index = {c: i for i, c in enumerate(system.coordinates)}

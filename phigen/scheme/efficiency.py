@@ -23,8 +23,8 @@ OPERATION, FUNCTION = 0.5, 7.0
 #: for which each flow waits for the results of the flow before.
 EXPLICIT_STEP = 25.0
 #: Flows that change different coordinates need not wait for one another. So the time of the operations is divided by
-#: the dimension over WAITING_COORDINATES; this divisor is at least 1 and at most MOST_PARALLEL. Without the division,
-#: the estimates for tops and so(4) were 2.4 times too large.
+#: n/WAITING_COORDINATES in dimension n. This divisor is at least 1 and at most MOST_PARALLEL. Without the division, the
+#: estimates for tops and so(4) were 2.4 times too large.
 WAITING_COORDINATES, MOST_PARALLEL = 2.6, 2.4
 #: Three numbers. First: nanoseconds of an operation in a Newton iteration with several SIMD lanes. Second: the number
 #: of operations whose code fits into the caches. Third: additional nanoseconds of each operation beyond this number.
@@ -52,10 +52,11 @@ NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.6, 10: 1.3}
 
 
 def cost(program: Program, grown: float = 1.0) -> float:
-    """Return the estimated computing time for a given length of trajectory, at the accuracy that belongs to the order.
+    """Return the estimated computing time of a trajectory of fixed length, at equal accuracy.
 
-    The unit of the result is arbitrary, but equal for all schemes. The operations are multiplied by ``grown``; this
-    gives a lower bound for a program of a higher order, which has more operations.
+    The accuracy is that which this module assumes for the order. The unit of the result is arbitrary, but equal for all
+    schemes. A program of higher order has more operations. A lower bound for its time follows from a program of lower
+    order, with the number of operations multiplied by ``grown``.
     """
     step, even_order = program.step, program.order + program.order % 2
     return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even_order]

@@ -21,8 +21,11 @@ Pattern = Sequence[Sequence[bool]]
 
 
 def pivot_order(pattern: Pattern) -> list[int]:
-    """Return the order of the diagonal pivots. The next pivot has the smallest product of row and column length in the
-    remaining matrix; among equals it has the smallest index."""
+    """Return the order of the diagonal pivots.
+
+    The next pivot is the one for which (entries in its row)·(entries in its column) of the remaining matrix is
+    smallest. If several pivots are equal in this respect, the first of them is taken.
+    """
     return [k for k, _ in _pivots(pattern)]
 
 

@@ -1,9 +1,10 @@
-"""Factoring out of constant factors, so that they are multiplied with one another once, before the steps.
+"""Collection of constant factors, whose products are computed once, before the steps.
 
 Every value is written as q·s·c with a number q, a static factor s, which depends on parameters and the step size, and a
 factor c that depends on the state. For a product, the three factors are multiplied separately. In a sum, a static
 factor that all terms share is factored out: (h²x²)/4 + (h²y²)/4 becomes (h²/4)(x² + y²), with one coefficient and four
-operations. Numbers are factored out of sums too, and join the coefficient of the product that contains the sum.
+operations. A number that is factored out of a sum is multiplied into the coefficient of the product that contains the
+sum.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
 def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
     """Return the increments with coefficients in place of state-independent values.
 
-    Of two forms the cheaper one is returned: with static factors collected by `gather`, or left as they are.
+    Two forms are compared: with static factors collected by `gather`, and without. The cheaper form is returned.
     """
     hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
     return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)

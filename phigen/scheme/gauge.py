@@ -24,11 +24,12 @@ from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbol
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: A multiple λ of a Casimir C is free only if S_1, S_2 and S_3 for H − λC have at most this many times as many terms as
-#: for H. Beyond this ratio the additional terms cost more than the smaller error gains.
+#: The solver chooses the multiple λ of a Casimir C only if λ makes the series little longer. The number of terms of
+#: S_1, S_2 and S_3 for H − λC, divided by that for H, must not exceed this ratio. Beyond it, the additional terms cost
+#: more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
-#: Index i of the term S_i of the generating function whose error h^i π∇S_i the gauge makes small.
+#: The gauge makes the error h^i π∇S_i of one term S_i of the generating function small. This is its index i.
 GUIDE = 3
 
 #: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches for a gauge.
@@ -106,11 +107,10 @@ class Gauge:
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:
-        """Return the system that is discretised: H is replaced by H − Σ λ_c C_c or, with a monitor g, by g(H + e) − Σ
-        λ_c C_c.
+        """Return the system that is discretised.
 
-        With a monitor g and forces, H remains, and the vector force f is replaced by gf; later the covector of a step
-        is derived from H, as τg(∇H + ζ).
+        Its H is H − Σ λ_c C_c or, with a monitor g, g(H + e) − Σ λ_c C_c. With a monitor g and forces, H remains, and
+        the vector force f is replaced by gf. In this case the covector of a step is later derived from H.
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)
@@ -241,7 +241,7 @@ def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
     try:
         limit = MAX_TERM_RATIO * _state_terms(ungauged.series.polynomial(GUIDE), ungauged.system)
         if _state_terms(_first_term(gauged), ungauged.system) > limit:
-            return False  # too many terms in S_1 already; S_3 of a long Casimir would take long
+            return False  # S_1 alone has too many terms; computing S_3 would take long
         polynomial = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
@@ -259,8 +259,7 @@ def _first_term(gauged: Gauged) -> PolynomialSeries:
 
 
 def _state_terms(series: PolynomialSeries, system: System) -> int:
-    """Return the number of different monomials in variables that depend on the state, over all terms S_1, S_2, … of a
-    series."""
+    """Return the number of monomials in state-dependent variables, over all terms S_1, S_2, … of a series."""
     tower = series.tower
     state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], system.coordinates)]
     return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})

@@ -101,8 +101,8 @@ def _other_coordinates(system: System) -> str:
     """Return the beginning of a hint that suggests other coordinates, for which an exact Poisson map may be
     known.
 
-    For a linear or affine π it suggests a basis with fewer structure constants, for a quadratic π linear combinations
-    of the coordinates. It is "" for any other π.
+    For a linear or affine π, the hint suggests a basis with fewer structure constants. For a quadratic π, it suggests
+    linear combinations of the coordinates. For any other π, the result is "".
     """
     if isinstance(system.shape, LiePoisson | Affine):
         return (
@@ -226,8 +226,10 @@ def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -
 
 
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel with the whole table of coefficients as its input, instead of the part that existed when it was
-    built."""
+    """Return the kernel with the whole table of coefficients as its input.
+
+    Before, its input is the part of the table that existed when the kernel was built.
+    """
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
     )

@@ -1,9 +1,9 @@
-"""Multiples λ of Casimirs that make the group elements of a Gauss step slower, so that its fixed-point sweeps converge
+"""Multiples λ of Casimirs for Gauss steps: they slow down the group elements, so that fixed-point sweeps converge
 faster.
 
 H and H − Σ λ_c C_c have the same flow in the coordinates x. But a Gauss step moves x by the action of a group element,
-whose velocity is ∇H in the first case and ∇H − Σ λ_c ∇C_c in the second. For quadratic H and C_c the second derivatives
-are constant. The λ_c are chosen such that the matrix of second derivatives of H − Σ λ_c C_c has the least norm.
+whose velocity is ∇H in the first case and ∇H − Σ λ_c ∇C_c in the second. For quadratic H and C_c, the second
+derivatives of H − Σ λ_c C_c form a constant matrix. The λ_c are chosen such that the norm of this matrix is smallest.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LARGEST_DENOMINATOR = 1000
 
 
 def slowest(system: System, realisation: Realisation) -> Gauge:
-    """Return the gauge with the multiples of quadratic Casimirs for which the group elements of a step are slowest.
+    """Return the gauge of quadratic Casimirs for which the group elements of a step are slowest.
 
     The gauge is empty if the second derivatives of H are not constant.
     """

@@ -11,8 +11,8 @@ from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, fold, raw, substitute, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kinds of symbols: for derivatives of the unknowns that are transformed to the frame of the next step, and for
-#: velocities in Lie algebras.
+#: Two kinds of symbols. The first is for derivatives of the unknowns, in the kernel that transforms these derivatives
+#: to the frame of the next step. The second is for velocities in Lie algebras.
 SLOPE, VELOCITY = "k", "velocity"
 
 #: The symbol of the weight of stage j: the step size h times the weight b_j of the quadrature.
@@ -97,10 +97,10 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the vectors y for which quaternions F with y = F* k F are computed at the start of a step.
+    """Return the kernel of the vectors y that determine the frames at the start of a step.
 
-    These F are the frames of a step; there is one F for each copy of the quaternions in the algebra of the group
-    elements.
+    A frame is a quaternion F with y = F* k F. There is one frame for each copy of the quaternions in the algebra of the
+    group elements.
     """
     return Kernel(
         "functionals",
@@ -114,8 +114,8 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     """Return the kernel that transforms derivatives of the unknowns to the frame in which the next step starts.
 
     The derivatives predict the stages of the next step. Each step starts with the group element 1, so derivatives of a
-    group element that ends at G are multiplied by G* = G⁻¹ from the left. Returns None if no unknown needs a
-    transformation: without group elements, or if all group elements have frames F (see `phigen.gauss.lift`).
+    group element that ends at G are multiplied by G* = G⁻¹ from the left. Returns None if nothing is to be transformed:
+    there are no group elements, or all of them have frames F (see `phigen.gauss.lift`).
     """
     if all(group.copies for group in points.realisation.groups):
         return None

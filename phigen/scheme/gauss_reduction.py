@@ -1,12 +1,13 @@
-"""Gauss sweeps over a part of the unknowns, when the other unknowns follow from it by linear equations.
+"""Gauss sweeps over a part of the unknowns, if linear equations give all other unknowns.
 
 An example is q̇ = M⁻¹p with ṗ = −∇V(q): the sweeps iterate p alone. In general a *follower* f has ḟ = r₀ + Σ_k c_k z_k
-with constant c_k, and all other unknowns z depend on followers only. The Gauss method has the nodes τ_i, the weights
-b_j and the matrix A with the entries a_ij. For an unknown z_k with the rate ż_k, L_k,j = h b_j ż_k is the increment of
-stage j. So the offset of z_k at stage i is Σ_j μ_ij L_k,j with μ_ij = a_ij/b_j. Let ν be the product of the matrices A
-and μ. Then the offset of f at stage i, and the value f' at the end of a step that starts at f = 0, are
+with constants r₀ and c_k, and the derivatives of the other unknowns z_k depend on followers only. The unknowns are
+offsets from the start of the step, where they are 0. The Gauss method has the nodes τ_i, the weights b_j and the matrix
+A with the entries a_ij. L_k,j = h b_j ż_k is the increment of z_k at stage j. So z_k at stage i is Σ_j μ_ij L_k,j with
+μ_ij = a_ij/b_j. Let ν be the product of the matrices A and μ. Then f at stage i, and its value f' at the end of the
+step, are
 
-    Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j),    f' = h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j).
+    f_i = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j),    f' = h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j).
 
 One sweep over the z contracts as much as two sweeps over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and all brackets
 between two followers or between two z are 0, the step is symplectic, as Suris showed. Unknowns on which no other
@@ -25,8 +26,8 @@ from phigen.scheme.steps import ReducedSweeps
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kind of the symbols for the sums Σ_j ν_ij L_k,j at stage i. They are integrals of the unknowns z_k up to this stage;
-#: the kernels of reduced sweeps read them.
+#: Kind of the symbols for the sums Σ_j ν_ij L_k,j at stage i, which the kernels of reduced sweeps read. Such a sum is
+#: the integral of the unknown z_k up to the stage.
 READ = "u"
 
 #: Symbols of the time of a stage since the start of the step, as a fraction of the step, and of the step size.
@@ -34,11 +35,10 @@ TIME, LENGTH = Symbol("stage_time"), Symbol("stage_step")
 
 
 def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweeps | None:
-    """Return the kernels of sweeps over a part of the unknowns, from which all other unknowns follow by linear
-    equations.
+    """Return the kernels of sweeps over a part of the unknowns; linear equations give all other unknowns.
 
-    Returns None if the unknowns cannot be divided in this way, if an exact step would not be symplectic, or if some
-    unknowns are group elements or logarithms.
+    Returns None if the unknowns cannot be divided in this way, or if some unknowns are group elements or logarithms.
+    Returns None also if the step must be symplectic and the reduced sweeps would not make it symplectic.
     """
     if points.realisation.groups or points.realisation.logarithms:
         return None
@@ -76,10 +76,10 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 
 
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
-    """Whether the iterated unknowns and the followers are two commuting sets that together make up all unknowns but the
-    time.
+    """Whether the bracket of any two iterated unknowns, and of any two followers, is 0.
 
-    Then only brackets between one set and the other are nonzero, as for momenta and positions.
+    This holds for momenta and positions. The result is False if some unknown other than the time is in neither of the
+    two sets.
     """
     places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
     index_pairs = ((i, j) for group in places for i in group for j in group)
@@ -88,9 +88,9 @@ def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequenc
 
 
 def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
-    """Return the unknowns that must be known in the sweeps: unknowns that depend on themselves, directly or through
-    others, and all unknowns on which these unknowns depend.
+    """Return the unknowns that must be known during the sweeps.
 
+    These are the unknowns that depend on themselves, directly or through others, and all unknowns on which they depend.
     ``reads[k]`` has the unknowns on which the derivative of unknown k depends.
     """
     required = set(range(len(reads)))
@@ -116,10 +116,10 @@ def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
-    """Return the offset of a follower at a stage: its linear equation integrated from the start of the step.
+    """Return the offset of a follower at a stage: its linear equation, integrated from the start of the step.
 
-    ``rate`` is the right-hand side of the equation, ``row`` has its derivatives with respect to the other unknowns, and
-    ``integrals`` the integrals of the increments of these unknowns up to the stage.
+    ``rate`` is the right-hand side of the equation. ``row`` has its derivatives with respect to the other unknowns.
+    ``integrals`` has the integrals of these unknowns up to the stage.
     """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]

@@ -44,8 +44,7 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """The covector p that rotates a body in a step: without the forces, which act on the momentum of the body
-        only."""
+        """The covector p that rotates a body in a step. It omits forces, which act on the momentum only."""
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
@@ -82,8 +81,8 @@ def collected_form(
 
     In the first form each entry of the Hessian is a polynomial. In the second form the Hessian is the derivative of the
     Horner form of the gradient. ``increments`` are the symbols of noise increments, on which coefficients may depend.
-    The list is empty if a gradient with one operation per term would cost more than ``worth``, or if the monomials
-    would take more than `limits.CELLS` numbers. Raises `OverflowError` if the polynomial is too large to be counted.
+    The list is empty if the polynomial has too many monomials, compared with ``worth`` or with `limits.CELLS`. Raises
+    `OverflowError` if the polynomial is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
@@ -118,9 +117,9 @@ def collected_form(
 def graph_form(
     series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return the gradient by one reverse sweep over the shared graph of S_h, and each row of the Hessian by another
-    sweep.
+    """Return the gradient and the Hessian of S_h as graphs with shared sub-expressions.
 
+    One reverse sweep over the graph of S_h gives the gradient, and one further sweep gives each row of the Hessian.
     ``inputs`` are symbols that change from step to step, such as the time. Raises `OverflowError` as soon as the
     derivatives have more operations than one kernel may have.
     """

@@ -20,7 +20,7 @@ EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel in the step of a lattice; from it follow the arrays that the loops around the kernel use."""
+    """Purpose of a kernel in the step of a lattice. It determines the arrays that the loops around the kernel use."""
 
     OTHER = auto()
     SWEEP = auto()  # the increment of a state by a flow
@@ -65,8 +65,10 @@ class Role(Enum):
 
     @property
     def is_energy(self) -> bool:
-        """Whether the kernel computes the density of an energy, or its derivative; bonds and pairs contribute to such
-        densities."""
+        """Whether the kernel computes the density of an energy, or the derivative of this density.
+
+        Bonds and pairs contribute to energies.
+        """
         return self in (Role.ENERGY, Role.ENERGY_SLOPE)
 
     @property
@@ -80,8 +82,8 @@ class Role(Enum):
         return Role[f"TRANSPOSED_{self.name}"]
 
 
-#: Roles of kernels that read the state at the start of a stage, and roles of kernels that read a variation, a tangent
-#: vector of the state.
+#: Two sets of roles: of kernels that read the state at the start of a stage, and of kernels that read a variation. A
+#: variation is a tangent vector of the state.
 _OF_STARTS = frozenset({Role.RELAX, Role.SLOPE, Role.SIDE})
 _OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW, Role.ENERGY_SLOPE})
 
@@ -101,10 +103,11 @@ class Kernel:
     ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` has sub-expressions that get a name
     in the generated code, such as momenta and second derivatives. ``purpose`` is the comment in generated code.
 
-    The first output may contain matrices A, in whose place the generated function returns exp(A) − 1. ``exponentials``
-    lists the positions of these matrices: the index of the first entry, and the number of rows. The transpose of such a
-    kernel has ``exponents``, a kernel that computes all these A. The input `EXPONENTS` of the transpose has the
-    cotangents of the A, which the generated code computes from those of exp(A) − 1 in the input ``coef_bar``.
+    The first output may contain matrices A; the generated function then returns exp(A) − 1 in place of A.
+    ``exponentials`` has two numbers for each A: the index of its first entry in the output, and its number of rows. The
+    transpose of such a kernel reads the cotangents of the A as its input `EXPONENTS`. The generated code computes them
+    from the cotangents of exp(A) − 1, which the input ``coef_bar`` holds; to this end ``exponents`` is a kernel that
+    computes all A.
     """
 
     name: str
@@ -132,8 +135,8 @@ class Kernel:
         return [v for o in self.outputs for v in o.values]
 
     def along(self, array: str) -> list[tuple[str, Expression]]:
-        """Return, for a transposed kernel, the symbols of the input ``array`` with the cotangent that it computes for
-        each.
+        """Return pairs of a symbol of the input ``array`` and the cotangent that a transposed kernel computes
+        for it.
 
         The list is empty if the kernel computes no cotangents of this array.
         """

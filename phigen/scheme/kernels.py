@@ -30,16 +30,16 @@ from phigen.symbolic.symbols import STEP, Symbol, momentum
 
 #: Largest dimension in which elimination is written as straight-line code for every matrix, even without zeros.
 UNROLLED_DIMENSION = 4
-#: Largest number of operations, divided by n³, for which elimination is written as straight-line code in higher
-#: dimensions n. A full matrix takes 0.7 n³ operations; the limit is met by matrices with many zeros.
+#: Limit for higher dimensions n: elimination is written as straight-line code if it takes at most this number times n³
+#: operations. A full matrix takes 0.7 n³; matrices with many zeros stay below the limit.
 MAX_SPARSE_SHARE = 0.6
 
 
 def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expression], Sequence[Expression]]:
-    """Return α − y and β − α including the impulse hf of a vector force f, half of it before and half after the motion.
+    """Return α − y and β − α of a step, including the impulse hf of a vector force f.
 
-    So the step is α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2. If the bi-realisation is symmetric, the step is
-    symmetric too, and has order 2.
+    Half of the impulse acts before the motion, half after it: the step is α(y, p) = x + hf(y)/2 and x' = β(y, p) +
+    hf(y)/2. If the bi-realisation is symmetric, the step is symmetric too, and has order 2.
     """
     if system.forces is None:
         return realisation.displacement, realisation.increment
@@ -215,9 +215,9 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
 
 
 def generate_kernel(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
-    """Return the kernel for a step along paths: ∇S_h(y) and 1 − ½ Hess S_h(y) π(y), at the mean y of a path.
+    """Return the kernel of ∇S_h(y) and 1 − ½ Hess S_h(y) π(y) at the mean y of a path, for steps along paths.
 
-    The matrix is, up to O(h²), the Jacobian of the equation p − ∇S_h(y(p)) = 0 that is solved for p.
+    A step solves p − ∇S_h(y(p)) = 0 for p. Up to O(h²), the matrix is the Jacobian of this equation.
     """
     n, hessian, pi = system.dimension, generating.hessian, system.poisson
     half = number(Fraction(1, 2))
@@ -238,7 +238,7 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 def path_elimination(n: int) -> Kernel | None:
     """Return the kernel of elimination for the equation for p of a step along paths; None if a loop is faster.
 
-    The n×n matrix of this equation has no zeros that are known before.
+    The n×n matrix of this equation is treated as full.
     """
     return _elimination_kernel(full(n)) if n <= UNROLLED_DIMENSION else None
 

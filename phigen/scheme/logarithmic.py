@@ -1,9 +1,10 @@
-"""The monitor ``log`` of a splitting into two parts, H = A + B: steps of equal size in τ for K = log(A + e) − log(−B).
+"""The monitor ``log`` of a splitting into two parts, H = A + B.
 
-A is constant along its own flow, so the flow of log(A + e) over τ is the flow of A over the time τ/(A + e). In the same
-way the flow of −log(−B) is the flow of B over τ/(−B). The orbits are those of H where K = 0, that is, where A + e = −B;
-the energy level e = −H(x₀) is constant on a trajectory. The physical time advances by ∂K/∂e τ = τ/(A + e) in the flow
-of A, and not at all in the flow of B. Steps require A + e > 0 and −B > 0.
+H is replaced by K = log(A + e) − log(−B), and steps have equal size in the time τ of K. A is constant along its own
+flow, so the flow of log(A + e) over τ is the flow of A over the time τ/(A + e). In the same way the flow of −log(−B) is
+the flow of B over τ/(−B). Where K = 0, that is, where A + e = −B, the orbits are those of H. The energy level e =
+−H(x₀) is constant on a trajectory. The physical time advances by ∂K/∂e τ = τ/(A + e) in the flow of A, and not at all
+in the flow of B. Steps require A + e > 0 and −B > 0.
 
 S. Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118
 (1999).
@@ -48,9 +49,7 @@ class Logarithmic:
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the duration of the flow of A or of B in a step over τ with K = log(A + e) − log(−B): τ/(A + e) for A,
-        τ/(−B) for B.
-        """
+        """Return how long the flow of A or of B runs in a step over τ: τ/(A + e) for A, τ/(−B) for B."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:
@@ -78,8 +77,8 @@ def fact_of(negative: str) -> str:
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
     """Return the monitor ``log`` of a splitting, or None if the spec has no monitor.
 
-    Raises `SpecError` unless H consists of two parts A and B, one of which is negative at least where runs start, and
-    for options that exclude the monitor.
+    Raises `SpecError` for options that exclude the monitor, and unless H is the sum of two parts. One of the parts must
+    be negative, at least where runs start.
     """
     if spec.monitor is None:
         return None
@@ -111,19 +110,18 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
 def composition_of(requested: str, order: int) -> str:
     """Return the name of the composition of a splitting with the monitor ``log``.
 
-    It is the ``requested`` one or, if the spec asks for ``auto``, a composition of Strang's splitting.
-
-    Steps of Strang's splitting of K stay on the orbit of a Kepler motion for every step size; steps of other methods
-    need not.
+    If the spec asks for ``auto``, this is a composition of Strang's splitting, else the ``requested`` one. Steps of
+    Strang's splitting of K stay on the orbit of a Kepler motion for every step size; steps of other methods need not.
     """
     composition = find("auto", order + order % 2)
     return composition.name if requested == "auto" and composition else requested
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether the expression ``e``, a part of H, is negative: by its form, or else at the starts of all runs.
+    """Whether the expression ``e``, a part of H, is negative.
 
-    If the spec has no runs, an expression that is never positive by its form counts as negative.
+    It is negative if its form proves this, or else if its values at the starts of all runs are negative. If the spec
+    has no runs, it also counts as negative if its form proves that it is never positive.
     """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):

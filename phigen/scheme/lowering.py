@@ -32,9 +32,9 @@ class Assignment:
 
 
 def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with all powers written as products of squares, reciprocals, square roots and cube roots.
+    """Return the roots with powers written as products of squares, reciprocals, square roots and cube roots.
 
-    Powers with other exponents remain, as calls of pow.
+    Powers for which this is impossible remain, as calls of pow.
     """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -99,7 +99,7 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, where that saves operations."""
+    """Return the roots with products such as ½(ab) and ½(ac) written as (½a)b and (½a)c, if this saves operations."""
     roots = list(roots)
     while True:
         regrouped = _numbers_regrouped(roots)
@@ -109,11 +109,10 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with a number times a product, such as ½(ab), written with the number at one factor, as
-    (½a)b.
+    """Return the roots with products such as ½(ab), a number times a product, rewritten as (½a)b.
 
-    The chosen factor is the one that occurs in the most products with the same number. A product remains unchanged if
-    its factors occur in no other such product.
+    The number is multiplied with the factor that occurs in the most products with the same number. A product remains
+    unchanged if its factors occur in no other such product.
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)

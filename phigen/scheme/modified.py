@@ -21,9 +21,9 @@ from phigen.symbolic.symbols import STEP
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
-    """Return the powers of h of the first ``count`` corrections in the modified Hamiltonian, starting at the order.
+    """Return the powers of h with which the first ``count`` corrections occur in the modified Hamiltonian.
 
-    For a symmetric method only every second power occurs.
+    The first power is the order of the method. For a symmetric method only every second power occurs.
     """
     return [order.order + (2 if symmetric else 1) * k for k in range(count)]
 
@@ -36,8 +36,7 @@ def corrections(
     gauge: Gauge | None = None,
     values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
-    """Return the terms H_0, H_1, … of the modified Hamiltonian Σ h^k H_k, as far as needed for ``count`` corrections of
-    H_0.
+    """Return the terms H_k of the modified Hamiltonian Σ h^k H_k, including the first ``count`` corrections.
 
     The Casimirs of the ``gauge`` are subtracted from H before. The ring of the terms also contains the step size.
     Numbers in ``values`` replace parameters, which shortens formulas. Raises `LimitError` if a correction is too large.

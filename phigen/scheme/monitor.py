@@ -1,13 +1,14 @@
-"""Monitored systems: steps of equal size in another time τ, with dt = g dτ and g > 0, that are Poisson maps.
+"""Monitored systems. Steps have equal size in a time τ with dt = g dτ and g > 0, and are Poisson maps.
 
-A canonical pair (t, e) is added to the coordinates. K = g(x)(H(x) + e) has the orbits of H where K = 0, that is, for e
-= −H(x₀). Along these orbits dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant, and the solver treats it as a
-parameter with a value for each trajectory. With the midpoint realisation for the pair, the step in x is that of the
-series S_τ(x; e) of K, and t₁ − t₀ = ∂S_τ/∂e at the solution y of its implicit equation. The time is as accurate as x,
-since (t, x) is a step of one method.
+A canonical pair (t, e) is added to the coordinates, and H is replaced by K = g(x)(H(x) + e). Where K = 0, that is, for
+e = −H(x₀), the orbits of K are those of H. Along these orbits dt/dτ = ∂K/∂e = g. K does not depend on t, so e is
+constant, and the solver treats it as a parameter with a value for each trajectory. If the pair has the midpoint
+realisation, the step in x is that of the series S_τ(x; e) of K, and t₁ − t₀ = ∂S_τ/∂e at the solution y of its implicit
+equation. The time is as accurate as x, since (t, x) is a step of one method.
 
 With forces, −H(x) is not constant and no step is a Poisson map, so K is not used. Instead, p = τg(∇H + ζ) and the
-impulse τgf at y, together with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
+impulse τgf at y, together with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x). Here ζ is the covector
+force and f the vector force.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 
 
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
-    """Yield the line about the monitor in the header of generated files; nothing without a monitor."""
+    """Yield the line about the monitor in the header of generated files, if there is a monitor."""
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau, and do not depend on e"
     elif monitor:
@@ -65,8 +66,8 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 def monitor_of(spec: Spec) -> Expression | None:
     """Return the monitor g of a spec whose steps have a generating function, or None.
 
-    Raises `SpecError` if the monitor is ``log``, or excluded by a lattice, a time in H, or a gauge together with
-    forces.
+    Raises `SpecError` if the monitor is ``log``. A lattice, a time in H, or a gauge together with forces exclude a
+    monitor, and raise the same error.
     """
     if spec.monitor is None:
         return None

@@ -154,10 +154,10 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
 
 
 def _modified(order: int) -> Corrected:
-    """Return the method for H = A + εB with a corrector of an odd ``order`` in h, and B − h²{B, {B, A}}/24 in place of
-    B.
+    """Return the method for H = A + εB with a corrector of odd ``order`` and a modified B: B − h²{B, {B,
+    A}}/24.
 
-    Its errors begin at ε h^(order + 1) and ε² h^4.
+    The errors of the method begin at ε h^(order + 1) and ε² h^4.
     """
     unmodified = _wisdom_holman(order)
     return replace(
@@ -171,9 +171,9 @@ def _modified(order: int) -> Corrected:
 
 
 def _wisdom_holman(order: int) -> Corrected:
-    """Return the method for H = A + εB with a corrector of an odd ``order`` in h; at order 1 there is no corrector.
+    """Return the method for H = A + εB with a corrector of odd ``order``; at order 1 there is no corrector.
 
-    Its errors begin at ε h^(order + 1) and ε² h^2.
+    The errors of the method begin at ε h^(order + 1) and ε² h^2.
     """
     name = "wisdom-holman" if order == 1 else f"wisdom-holman-{order}"
     half = Fraction(1, 2)

@@ -64,8 +64,7 @@ def _flow(system: System, source: Source) -> Flow:
 
 
 def driving_times(system: System) -> list[Expression]:
-    """Return for each source of noise the duration σ ΔW of its flow in half a step; ΔW is a single symbol for all
-    sources."""
+    """Return for each source of noise the duration σ ΔW of its flow in half a step; all have one symbol ΔW."""
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 

@@ -17,10 +17,11 @@ from phigen.scheme.alternation import Schedule
 
 @dataclass(frozen=True)
 class Nystrom:
-    """A splitting method of Nyström type: the times t_i of its flows in order, and the ``multiples`` m_i of its kicks.
+    """A splitting method of Nyström type: the times t_i of its flows in order, and the ``multiples`` m_i of its
+    kicks.
 
-    ``kicks_first`` says whether a step begins with a flow of V. ``error`` is the Euclidean norm of the leading error,
-    by which methods are compared; its components are those in the basis of the Lie algebra in
+    ``kicks_first`` says whether a step begins with a flow of V. Methods are compared by ``error``, the Euclidean norm
+    of their leading errors. These errors have components in a Lie algebra; its basis is defined in
     `tests/splitting/nystrom_algebra.py`.
     """
 
@@ -33,7 +34,7 @@ class Nystrom:
 
     @property
     def stages(self) -> int:
-        """The number of stages, each of which is a flow of the second part and a flow of the first part."""
+        """The number of stages. A stage is a flow of the second part, followed by a flow of the first part."""
         return len(self.times) // 2
 
     @property

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Order:
-    """The order of a method, and the number of ``terms`` S_1 … S_k of its generating function (for Gauss methods: of
-    its stages).
+    """The order of a method, and its number of ``terms``.
 
-    ``note`` tells the user if the order or the number of terms differs from what was asked for.
+    The terms are the S_1 … S_k of the generating function or, for Gauss methods, the stages. ``note`` tells the user if
+    the order or the number of terms differs from what was asked for.
     """
 
     order: int

@@ -1,10 +1,10 @@
 """Transposes of sums over the bonds or pairs of the sites of a lattice: each site collects its cotangents from its
 bonds.
 
-A site is the end a of some bonds and the end b of others. Often the sum at b equals the sum at a up to its sign, as the
-forces between two sites do. Then the contribution that a site receives as end b is the formula of the end a, applied to
-the cotangents of the site at the other end. So one formula is sufficient: a product of the Hessian of the energy of a
-pair with one vector.
+A site is the end a of some bonds and the end b of others. Often the sum at b equals the sum at a up to its sign, as for
+forces between two sites. Then one formula is sufficient: the contribution that a site receives as end b is the formula
+of the end a, applied to the cotangents of the site at the other end. This formula is a product of the Hessian of the
+energy of a pair with one vector.
 """
 
 from __future__ import annotations
@@ -30,13 +30,12 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 def transposed_at_ends(
     places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], transpose: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
-    """Return the loops over the bonds or pairs of a site that collect its cotangents: for each loop the end at which
-    the site lies, the bonds or pairs, and the kernel.
+    """Return the loops over bonds or pairs in which each site collects its own cotangents.
 
-    Each site collects the cotangents that it receives, so no two sites write to the same place. If the bonds of a site
-    are the same at both ends, there is one loop; its kernel also computes the sums themselves if they are to be
-    ``summed``. Otherwise there are two loops. In the first loop the site is the end b of the bonds, and the cotangents
-    of the sites at the ends a are read. In the second loop the site is the end a.
+    No two sites write to the same place. A loop is given by the end at which the site lies, the bonds or pairs, and the
+    kernel. If the bonds of a site are the same at both ends, there is one loop. If ``summed``, its kernel also computes
+    the sums that are transposed. Otherwise there are two loops. In the first loop the site is the end b of the bonds,
+    and the cotangents of the sites at the ends a are read. In the second loop the site is the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)
@@ -67,11 +66,11 @@ def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Ke
 def paired(
     ends: Mapping[str, tuple[str, str]], kernel: Kernel, transpose: Kernel, opposite: Collection[str] = ()
 ) -> Kernel:
-    """Return the transpose of a kernel of bonds or pairs that adds all contributions of a bond or pair to its site a.
+    """Return the transpose of a kernel of bonds or pairs, with all contributions of a bond added to its site a.
 
     ``ends`` maps each symbol to a pair: a field or parameter, and an end. The parameters of bonds in ``opposite`` have
-    the opposite sign as seen from b. The outputs for sums over the whole lattice, and for parameters of bonds, must be
-    summed over all sites and their bonds or pairs.
+    the opposite sign as seen from b. Some outputs contribute to sums over the whole lattice, or to parameters of bonds.
+    A loop over all sites and their bonds or pairs must add them up.
     """
     names = {place: s for s, place in ends.items()}
     exchanged = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}

@@ -43,10 +43,10 @@ class NodeSeries:
     """The Taylor series of a node: its value ``first`` at order 0, and the rule for its coefficients of the orders k ≥
     1.
 
-    The coefficient of order k is a sum of two kinds of terms. ``linear`` lists pairs of a series a and a factor, each
-    of which contributes factor · a_k. ``terms`` are sums of products of coefficients; for powers they are divided by
-    the value at order 0 of the series with the number ``divisor``. In expressions, the symbol ``s:i`` is the value of
-    series i at order 0.
+    The coefficient of order k is a sum of two kinds of terms. ``linear`` lists pairs of a series a and a factor; each
+    pair contributes factor · a_k. ``terms`` are sums of products of coefficients. For powers these sums are divided by
+    the value at order 0 of another series, whose number is ``divisor``. In expressions, the symbol ``s:i`` is the value
+    of series i at order 0.
     """
 
     first: Expression
@@ -60,7 +60,7 @@ class Recurrences:
     """The Taylor series of a path: series 0 … n−1 are the coordinates m_i, and series number ``slopes[i]`` is that of
     ṁ_i.
 
-    ``fixed`` are values that are constant along a path, functions of p and of the coefficients; their symbols are
+    ``fixed`` are values that are constant along a path. They depend on p and on the coefficients; their symbols are
     ``f:i``.
     """
 
@@ -82,9 +82,10 @@ class SeriesEntry:
 class PathSlopes:
     """Recurrences for the derivatives of a path with respect to its start, to p, and to some coefficients c.
 
-    The derivatives V = (∂m/∂m_0, ∂m/∂p) satisfy V̇ = J V + (0, π) with J = ∂(π(m)p)/∂m; the derivatives W with respect
-    to c satisfy Ẇ = J W + ∂(π(m)p)/∂c. ``jacobian`` has the entries of J, ``tensor`` those of π(m), and ``along`` those
-    of ∂(π(m)p)/∂c, a column for each c. ``series`` and ``fixed`` continue the lists of the path.
+    Let J = ∂(π(m)p)/∂m. The derivatives V = (∂m/∂m_0, ∂m/∂p) satisfy V̇ = J V + (0, π), and the derivatives W with
+    respect to c satisfy Ẇ = J W + ∂(π(m)p)/∂c. ``jacobian`` has the entries of J, ``tensor`` those of π(m), and
+    ``along`` those of ∂(π(m)p)/∂c, a column for each c. ``series`` and ``fixed`` are appended to the lists of the path
+    with these names.
     """
 
     series: tuple[NodeSeries, ...]
@@ -132,8 +133,9 @@ def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrenc
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the expressions with positive integer powers written as products; only other powers need a recurrence of
-    their own."""
+    """Return the expressions with positive integer powers written as products, since all other powers need a
+    recurrence.
+    """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if not e.args:

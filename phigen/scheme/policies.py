@@ -1,5 +1,5 @@
-"""Numerical constants of the runtimes in all languages: when an iteration ends, how far a predictor reaches, how the
-search for a gauge works.
+"""Numerical constants of the runtimes in all languages: for the ends of iterations, for predictors, and for the search
+for a gauge.
 
 Each constant is defined once, with its reason, and is printed into C, JavaScript and NumPy (`phigen.targets.policies`).
 Constants that only one runtime has, such as the number of steps in a block in C, are in the files of that runtime.

@@ -21,8 +21,8 @@ from phigen.symbolic.symbols import LEVEL
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Value of the precision option for single-precision code in languages where a library function has one name for all
-#: types, as in code for graphics cards.
+#: Value of the precision option for single-precision code in languages such as those of graphics cards, where a library
+#: function has one name for all types of numbers.
 OVERLOADED = "overloaded float"
 
 
@@ -102,11 +102,11 @@ MAX_NORMAL_VARIATE = 6.0
 
 @dataclass(frozen=True)
 class Noise:
-    """The sources of noise by name. Each source has ``parts`` independent increments ΔW in a step, with the same
-    distribution.
+    """The sources of noise by name.
 
-    ``fields`` is the kernel of the vector fields σπ∇g of all sources. It is None for lattices, where each site has
-    independent noise.
+    In a step each source has as many increments ΔW as ``parts`` says; they are independent and have the same
+    distribution. ``fields`` is the kernel of the vector fields σπ∇g of all sources. It is None for lattices, where each
+    site has independent noise.
     """
 
     sources: tuple[str, ...]
@@ -132,12 +132,12 @@ class Attitude:
     """Kernels of the group elements whose action on x is a step: one element for each stage, or for each flow of a
     splitting.
 
-    All elements are returned minus 1. ``turn`` is the element of an implicit stage as a function of y, the solution of
-    its equation; ``along`` is the element of a step along a path as a function of the covector p. If elements are
-    matrices exp(P), these two kernels return the components p of P and a bound for the square of the size of P, and
-    ``exponential`` computes exp(P) − 1 for a size of at most 1/2. ``turns`` has, for each flow of a splitting, its
-    increments and the product of the elements of the step up to this flow. ``rate`` is the gradient of the Casimirs
-    that were subtracted from H: they rotate the body, but do not change x.
+    Each kernel returns an element minus 1. ``turn`` is the element of an implicit stage as a function of y, the
+    solution of its equation. ``along`` is the element of a step along a path as a function of the covector p. If
+    elements are matrices exp(P), these two kernels return the components p of P, followed by a bound for the square of
+    the size of P. Then ``exponential`` computes exp(P) − 1, if the size is at most 1/2. ``turns`` has a kernel for each
+    flow of a splitting: the increments of the flow, and the product of the elements of the step up to this flow.
+    ``rate`` is the gradient of the Casimirs that were subtracted from H: they rotate the body, but do not change x.
     """
 
     group: Group
@@ -175,11 +175,10 @@ class Attitude:
 
 @dataclass(frozen=True)
 class StackBound:
-    """Bytes of stack of the longest chains of calls in a generated C solver, measured with a ``compiler`` and its
-    flags.
+    """Bytes of stack that a generated C solver needs, measured with a ``compiler`` and its flags.
 
-    ``init`` and ``step`` are the values for calls of these two functions; ``longest`` is the largest value over all
-    functions.
+    The stack is that of the longest chain of calls. ``init`` and ``step`` are the values for calls of these two
+    functions; ``longest`` is the largest value over all functions.
     """
 
     compiler: str

@@ -42,10 +42,11 @@ def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str])
 
 
 def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
-    """Yield equivalent forms of the sums over bonds: with permuted parameters of bonds, and with all bonds reversed.
+    """Yield equivalent forms of the sums over bonds.
 
-    Each item consists of the sums, the order of the parameters (() if it is unchanged), and a sign. Bonds are reversed,
-    with the sign −1, only if it is proved that every contribution changes its sign with the direction of the bond.
+    In some forms, parameters of bonds are permuted; in others, all bonds are reversed. Each item consists of the sums,
+    the order of the parameters (() if it is unchanged), and a sign. Bonds are reversed, with the sign −1, only if it is
+    proved that every contribution changes its sign with the direction of the bond.
     """
     loops = over_ends(gather)
     if len(loops) != 1 or not loops[0][1]:

@@ -1,5 +1,6 @@
-"""Kernels for the implicit equation of a stage on a lattice: the parts of its transpose, and its diagonal blocks at
-sites."""
+"""Kernels for the implicit equation of a stage on a lattice. Some transpose the equation. Another one computes
+derivatives for the diagonal blocks of the Newton matrix, one block for each site.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +11,12 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: Name of the kernel that differentiates the right-hand side of the equation y = … at a site with respect to y at this
-#: site.
+#: Name of the kernel for diagonal blocks. It differentiates the right-hand side of the equation y = … at a site with
+#: respect to y at the same site.
 _BLOCK = "own_slope"
 
-#: Selections of cotangents for a transposed kernel, as pairs: whether it computes the cotangents of fields, and whether
-#: it computes all other cotangents.
+#: Selections of the cotangents that a transposed kernel computes. The first entry of a pair says whether those of
+#: fields are computed, the second whether all others are.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
 #: Transposed kernels of a stage in the order of the reverse pass, with the kernels that they transpose. The first one

@@ -23,18 +23,18 @@ T = TypeVar("T")
 #: The inputs of a step that change from step to step, with their description in generated code.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: Name of the table of coefficients as an argument of kernels, and name of the output of ``refresh``, which is the end
-#: of this table.
+#: Two names: that of the table of coefficients as an argument of kernels, and that of the output of ``refresh``. This
+#: output is stored at the end of the table.
 TABLE, NOW = "coef", "now"
 
 
 class Coefficients:
-    """The table of the coefficients ``c:k`` of a program: expressions that do not depend on the state, each of which is
-    added once.
+    """The table of the coefficients ``c:k`` of a program: expressions that do not depend on the state.
 
-    ``values`` are the expressions that ``prepare`` computes. Then come the entries of the matrices exp(tA) − 1 in
-    ``exponentials``, and last the ``renewed`` expressions, which depend on the inputs of a step. The places of the last
-    two groups are unknown until the table is complete; until a call of `settled` they have provisional symbols.
+    No expression occurs twice. ``values`` are the expressions that ``prepare`` computes. Then come the entries of the
+    matrices exp(tA) − 1 in ``exponentials``, and last the ``renewed`` expressions, which depend on the inputs of a
+    step. The places of the last two groups are unknown until the table is complete. Until then they have provisional
+    symbols, which `settled` replaces.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
@@ -136,9 +136,9 @@ class Coefficients:
         return symbol(name)
 
     def refresh(self, **inputs: Sequence[str]) -> Kernel | None:
-        """Return the kernel ``refresh`` of the coefficients that depend on inputs of a step; None if there are none.
+        """Return the kernel ``refresh`` of the coefficients that depend on inputs of a step, if there are any.
 
-        It must be built before ``prepare``, since it may add values that ``prepare`` computes.
+        This kernel must be built before ``prepare``, since it may add values that ``prepare`` computes.
         """
         if not self.renewed:
             return None
@@ -199,10 +199,10 @@ def _expressions(tree: Any) -> Iterable[Expression]:
 
 
 def _rebuilt(tree: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
-    """Return a copy of nested tuples and dataclasses with the expressions in ``renamed``, by the ``id`` of the
-    original.
+    """Return a copy of nested tuples and dataclasses in which other expressions take the place of those inside.
 
-    Kernels that read the table of coefficients receive all of its ``slots`` as input.
+    ``renamed`` maps the ``id`` of an old expression to the new one. Kernels that read the table of coefficients receive
+    all of its ``slots`` as input.
     """
     if isinstance(tree, Expression):
         return renamed[id(tree)]

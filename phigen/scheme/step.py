@@ -100,10 +100,10 @@ def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequenc
 
 
 def explicit_order(displacement: Sequence[Expression], coordinates: Sequence[str]) -> list[int] | None:
-    """Return an order of the indices i in which y_i = x_i − a_i(y) can be solved by substitution; None if there is a
-    cycle.
+    """Return the order in which substitution solves the equations y_i = x_i − a_i(y) for the y_i, or None.
 
-    ``displacement`` is a(y).
+    The order lists the indices i. There is none if the equations depend on one another in a cycle. ``displacement`` is
+    a(y).
     """
     index = {c: i for i, c in enumerate(coordinates)}
     graph = {i: [index[s] for s in symbols_of(a) if s in index] for i, a in enumerate(displacement)}

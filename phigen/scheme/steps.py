@@ -28,10 +28,10 @@ class PathAdjoint:
     """The kernels and recurrences that transpose a step along a path; the formulas are in
     `phigen.scheme.adjoint`.
 
-    ``recurrences`` follow the path backwards together with its cotangents. The last cotangents are those of the
-    coefficients with the indices ``used``. ``curvature`` computes ∇S_h and its Hessian at the mean of the path.
-    ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the
-    derivatives of a path, by which many paths are transposed at once.
+    ``recurrences`` follow the path backwards, together with cotangents. The last of these are the cotangents of the
+    coefficients; ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and its Hessian at the
+    mean of the path. ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the
+    recurrences for the derivatives of a path, by which many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -116,8 +116,7 @@ class _Staged:
 
     @property
     def lift(self) -> Lift | None:
-        """The frames at which the group elements of a Gauss step start, if they follow the state; None if they start at
-        1."""
+        """The frames at which the group elements of a Gauss step start; None if all group elements start at 1."""
         return None
 
     @property
@@ -128,7 +127,9 @@ class _Staged:
 
     @property
     def reduced(self) -> ReducedSweeps | None:
-        """Sweeps over a part of the unknowns of a Gauss step, from which all other unknowns follow; else None."""
+        """Sweeps over a part of the unknowns of a Gauss step, if linear equations give all other unknowns; else
+        None.
+        """
         return None
 
     @property
@@ -138,8 +139,7 @@ class _Staged:
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """The recurrences of the path of a step together with its variation, for tangent maps; None if there are
-        none."""
+        """The recurrences of a path together with its variation, for tangent maps; None if there are none."""
         return None
 
     @property
@@ -160,8 +160,7 @@ class _Staged:
 
     @property
     def multiples(self) -> tuple[float, ...]:
-        """For each row of the schedule the multiple, in units of h², of the modified potential of a kick; empty if
-        there is none."""
+        """The numbers m of the modified potentials V + m h² {V, {V, T}}, one for each row of the schedule, or ()."""
         return self.flow_schedule.multiples if self.flow_schedule else ()
 
     @property
@@ -175,8 +174,7 @@ class _Staged:
         return None
 
     def maps(self, stages: int) -> int:
-        """Return the number of maps, stages or flows, in a step; ``stages`` is the number of stages of its
-        composition."""
+        """Return how many maps a step applies: its flows or, without flows, the ``stages`` of its composition."""
         return stages
 
     @property
@@ -209,9 +207,9 @@ class _Staged:
 class InnerSolve:
     """Settings of the iteration that solves the implicit equation of a step.
 
-    The iteration ends when the error that remains after a correction is estimated to be below ``tolerance``.
-    ``relative`` says that errors are measured relative to each coordinate; this is so for log-canonical π, whose
-    coordinates keep their signs.
+    The iteration ends when the error that remains after a correction is estimated to be below ``tolerance``. If
+    ``relative``, errors are measured relative to each coordinate. This is used for log-canonical π, whose coordinates
+    keep their signs.
     """
 
     max_iterations: int = 20
@@ -383,8 +381,8 @@ class ReducedSweeps:
 
     The derivatives of the ``iterated`` unknowns depend on the ``followers`` only. The derivatives of the followers are
     linear functions of the ``integrated`` unknowns, which are some of the iterated ones. Both kernels read the
-    integrals of the integrated unknowns up to a stage. ``slope`` computes the derivatives of the iterated unknowns,
-    ``follow`` the followers.
+    integrals of the integrated unknowns from the start of the step to a stage. ``slope`` computes the derivatives of
+    the iterated unknowns, ``follow`` the followers.
     """
 
     slope: Kernel
@@ -398,7 +396,7 @@ class ReducedSweeps:
 class Lift:
     """Frames of a Gauss step: quaternions F, at which the group elements of the step start instead of at 1.
 
-    ``functionals`` computes vectors y, three numbers for each copy of the quaternions, and F satisfies F* k F = y. The
+    ``functionals`` computes a vector y of three numbers for each copy of the quaternions; F satisfies F* k F = y. The
     frames have ``size`` components, which are the last unknowns of the step. ``copies`` has, for each copy of the
     quaternions, the places of its basis 1, i, j, k among these components.
     """
@@ -412,15 +410,16 @@ class Lift:
 class Gauss(_Staged):
     """Step by Gauss collocation.
 
-    Fixed-point sweeps solve the stage equations Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j). Then x' = x + D(x, Σ_j
-    L_j). The unknowns Z are offsets from the start of the step, where they are 0. ``slope`` is f; its input x is the
-    start of the step, followed by the time if f depends on the time. ``change`` is D. ``frame`` transforms the L_j to
-    the frame of the next step, if that frame differs. The first ``plain`` unknowns have the scale of the state; all
-    further unknowns are increments of logarithms or of group elements, and have the scale 1.
+    Fixed-point sweeps solve the stage equations Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), where b_j are the
+    weights of the method, and μ_ij = a_ij/b_j follows from its matrix a_ij. Then x' = x + D(x, Σ_j L_j). The unknowns Z
+    are offsets from the start of the step, where they are 0. ``slope`` is f; its input x is the start of the step,
+    followed by the time if f depends on the time. ``change`` is D. ``frame`` transforms the L_j to the frame of the
+    next step, if that frame differs. The first ``plain`` unknowns have the scale of the state. All further unknowns are
+    increments of logarithms or of group elements, and have the scale 1.
 
-    ``lifted`` is the same step with the unknowns U = FG in place of the group elements G, where the frame F is the
-    value of U at the start of the step. It is None if some group element has no frame. The ``lift`` of that step
-    describes the frames.
+    ``lifted`` is the same step with the unknowns U = FG in place of the group elements G. The frame F is the value of U
+    at the start of the step. ``lifted`` is None if some group element has no frame. The frames are described by the
+    ``lift`` of this second step.
     """
 
     slope: Kernel
@@ -528,9 +527,7 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size of the axis above which no size is excluded: that of the longest seam, plus
-        ``wide`` sites.
-        """
+        """The size from which on every size of the axis is allowed: that of the longest seam, plus ``wide`` sites."""
         return 2 * self.wide + self.period - 1
 
 
@@ -538,9 +535,10 @@ class Seam:
 class Sites:
     """The sites of a lattice, whose sizes are arguments of the solver.
 
-    ``places`` maps each symbol of kernels to a field (or a parameter with a value at each site) and an offset from the
-    site, with the fastest axis last. The colour of a site is Σ ``weights``·position modulo ``colours``. The sizes must
-    be multiples of ``periods``, and at least ``least``. ``open`` says which axes have open ends.
+    ``places`` maps each symbol of kernels to a pair: the name of a field, or of a parameter with a value at each site,
+    and an offset from the site. Offsets have one entry for each axis, the fastest axis last. The colour of a site is Σ
+    ``weights``·position modulo ``colours``. The sizes must be multiples of ``periods``, and at least ``least``.
+    ``open`` says which axes have open ends.
     """
 
     axes: tuple[str, ...]
@@ -564,12 +562,12 @@ class Sites:
 class Ends:
     """A ``kernel`` for the bonds or pairs between a site, called a here, and another site, called b.
 
-    The inputs of the kernel are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters of the bond. ``end`` is
-    the end of the bond at which the site lies, in the order of the user: "a", "b", or "" for both ends. ``chosen`` says
-    which of the two sites must have the colour of the sweep: ``here`` (a), ``there`` (b), or "" for neither.
-    ``extremes`` maps the index of an output to ``max`` or ``min``, if this output is reduced in this way; all other
-    outputs are summed. For pairs, b runs over the sites from number ``first`` on. If the kernel is ``massive``, the
-    sites after the last one with a nonzero mass are omitted, since they contribute nothing.
+    The inputs of the kernel are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters of the bond. The user
+    also names the ends of a bond "a" and "b"; ``end`` is the name of the end at which the site lies, or "" for both
+    ends. ``chosen`` says which of the two sites must have the colour of the sweep: ``here`` (a), ``there`` (b), or ""
+    for neither. ``extremes`` maps the index of an output to ``max`` or ``min``, if this output is reduced in this way;
+    all other outputs are summed. For pairs, b runs over the sites from number ``first`` on. If the kernel is
+    ``massive``, the sites after the last one with a nonzero mass are omitted, since they contribute nothing.
     """
 
     kernel: Kernel
@@ -603,9 +601,9 @@ class Gather:
 class Partners:
     """Sums over the bonds or pairs of a site that are not part of a sweep, as functions of the parameters.
 
-    ``energy`` is half of the energies, since each energy is summed at both of its sites. ``field`` has the forces or
-    rates of the vector field. ``varied`` has the forces and their derivatives in the direction of a variation of the
-    fields, for steps that solve an `Equation`. ``observed`` has the densities of observables. ``of_parts`` has the
+    ``energy`` has half of each energy, since each energy is counted at both of its sites. ``field`` has the forces or
+    rates of the vector field. For steps that solve an `Equation`, ``varied`` has the forces, and their derivatives in
+    the direction of a variation of the fields. ``observed`` has the densities of observables. ``of_parts`` has the
     energies of parts of H and their derivatives, by the name of the kernel that reads them (`PartRates`). ``graph``
     says that the bonds are those of a graph.
     """
@@ -630,12 +628,13 @@ class Partners:
 
 @dataclass(frozen=True)
 class PartRates:
-    """Kernels for the monitor ``log`` on a lattice: steps equal in τ for K = log(A + e) − log(−B), where H = A + B.
+    """Kernels for the monitor ``log`` on a lattice, with H = A + B.
 
-    The flow of a part of K over τ is the flow of A over τ/(A + e), or that of B over τ/(−B). ``energies`` are the
-    kernels of the densities of A and B, in the order of the parts of the step; the part with the number ``negative`` is
-    B. ``slopes`` are the derivatives of the densities in the direction of a variation, if tangent maps were requested.
-    In that case ``prepare`` has the variation of the duration of the flow as the further input ``late``.
+    Steps have equal size in the time τ of K = log(A + e) − log(−B). The flow of a part of K over τ is the flow of A
+    over τ/(A + e), or that of B over τ/(−B). ``energies`` are the kernels of the densities of A and B, in the order of
+    the parts of the step; the part with the number ``negative`` is B. If tangent maps were requested, ``slopes`` are
+    the derivatives of the densities in the direction of a variation. Then ``prepare`` has one more input, ``late``: the
+    variation of the duration of the flow.
     """
 
     energies: tuple[Kernel, Kernel]
@@ -653,14 +652,14 @@ class Sweep:
     """Loop over the sites of a lattice that adds increments to the fields with the indices ``moved``.
 
     The sites are those of one ``colour``, or all sites if ``colour`` is None. A sweep reads no values that it changes.
-    If it is ``inside``, it omits the sites near seams. If it has a ``window``, it updates only sites near seams, by
-    those terms of H that start on the seams of certain axes; ``window`` is the bit mask of these axes, and 0 stands for
-    terms that start on no seam. Sites before number ``first`` are not updated.
+    If it is ``inside``, it omits the sites near seams. If it has a ``window``, it updates only sites near seams, by the
+    terms of H that start on the seams of certain axes. ``window`` is the bit mask of these axes; 0 stands for terms
+    that start on no seam. Sites before number ``first`` are not updated.
 
-    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. A symbol of ``present`` is 1 if a
-    term of H does not extend beyond an open end, or if a site has the colour of the sweep, else 0. ``gathered`` are the
-    sums of ``gather``. ``tangent`` is the derivative of the sweep, if tangent maps were requested: it adds increments
-    to a variation of the fields, from the inputs of this sweep and the input ``varied``.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. A symbol of ``present`` is 1 or
+    0. It says whether a term of H stays within the open ends, or whether a site has the colour of the sweep.
+    ``gathered`` are the sums of ``gather``. ``tangent`` is the derivative of the sweep, if tangent maps were requested:
+    it adds increments to a variation of the fields. It has the inputs of this sweep, and the input ``varied``.
     """
 
     kernel: Kernel
@@ -705,10 +704,10 @@ class Equation:
 class RelativeSites:
     """The relative coordinates in which the steps of a lattice of attracting bodies are made.
 
-    ``jacobi`` says that these are Jacobi coordinates, and not democratic heliocentric ones; ``momenta`` says that the
-    fields are positions and momenta, and not positions and velocities. ``axes`` pairs the index of each position with
-    that of its momentum or velocity. ``remainder`` is the index of the part B of H = A + B, whose forces are sums over
-    pairs: the first sums read positions, and ``shifts`` further sums read velocities. ``mass`` is the name of the
+    They are Jacobi coordinates if ``jacobi``, else democratic heliocentric ones. The fields are positions and momenta
+    if ``momenta``, else positions and velocities. ``axes`` pairs the index of each position with that of its momentum
+    or velocity. ``remainder`` is the index of the part B of H = A + B. The forces of B are sums over pairs. The last
+    sums read velocities, and ``shifts`` is their number; all others read positions. ``mass`` is the name of the
     parameter at sites.
     """
 
@@ -757,11 +756,11 @@ class Sweeps(_Scheduled):
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a caller can make the sweeps of a step one by one, on planes of the lattice: this is offered for
-        splittings on grids.
+        """Whether a caller can make the sweeps of a step one by one, on planes of the lattice.
 
-        Noise is drawn by the sweep that reads it, so no sweep may read the noise of a neighbour. A seam lies at the end
-        of the whole lattice, so a caller with a part of the lattice does not have it; hence there must be no seam.
+        This is offered for splittings on grids. Noise is drawn by the sweep that reads it, so no sweep may read the
+        noise of a neighbour. There must be no seam: a seam lies at the end of the whole lattice, and a caller may have
+        a part of the lattice only.
         """
         reads_neighbour_increments = any(
             base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()
@@ -771,11 +770,11 @@ class Sweeps(_Scheduled):
         )
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Return which values the sweeps of a part of H access on a grid: (distance behind, distance ahead, read,
+        """Return which values the sweeps of a part of H access: (distance behind, distance ahead, read,
         updated).
 
-        The distances count along the first axis. ``read`` is the bit mask of the fields that are read at other
-        positions along this axis, and ``updated`` that of the fields that are updated.
+        The distances count along the first axis of a grid. ``read`` is the bit mask of the fields that are read at
+        other positions along this axis. ``updated`` is the bit mask of the fields that are updated.
         """
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
         distant = [(f, offset[0]) for f, offset in places if offset[0]]

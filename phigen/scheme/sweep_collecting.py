@@ -1,7 +1,7 @@
-"""Transposed sweeps of lattices in collecting form: each site computes the contributions of its neighbours to its
-cotangents.
+"""Transposed sweeps of lattices in two forms. In the collecting form, a site computes all contributions to its
+cotangents, including those of its neighbours.
 
-In the storing form, a neighbour computes the contribution and stores it for the site. Collecting is faster if
+In the storing form, a neighbour computes its contribution and stores it for the site. Collecting is faster if
 contributions are cheap, such as those of springs: the site reads the fields of its neighbours anyway, and only their
 cotangents are read in addition. Storing is faster for expensive contributions, such as sines of sums over neighbours,
 since the neighbour computes them only once.
@@ -77,8 +77,8 @@ def _from_receiver(
 ) -> Expression | None:
     """Return a contribution to the site at ``offset``, written in the symbols of that site.
 
-    ``value`` is the contribution in the symbols of the site that causes it. Returns None if the sweep has no symbol for
-    a value that the contribution needs.
+    ``value`` is the same contribution in the symbols of the site that it comes from. Returns None if it needs a value
+    for which the sweep has no symbol.
     """
     renamed: dict[str, Expression] = {}
     for s in symbols_of(value):

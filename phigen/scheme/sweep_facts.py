@@ -16,8 +16,10 @@ MAX_DIAGONALS = 64
 
 
 def reach(step: Sweeps) -> int:
-    """Return the largest distance, in sites, of a neighbour that the implicit equation of a stage reads, on a lattice
-    with one axis."""
+    """Return the distance, in sites, of the farthest neighbour that the implicit equation of a stage reads.
+
+    The lattice has one axis.
+    """
     relax = step.equation.relax if step.equation else None
     places = [step.sites.places[s] for s in relax.inputs["site"]] if relax else []
     return max((abs(offset[-1]) for f, offset in places if f not in step.sites.parameters), default=0)
@@ -41,17 +43,16 @@ def beside_seams(sweep: Sweep) -> bool:
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the code of the sites of colour 0 that a sweep with a ``window`` updates; None for a sweep without a
-    window.
+    """Return the code of the sites of colour 0 that a sweep with a ``window`` updates; None without a window.
 
-    The runtime marks each site near seams with a code: the bit mask of these seams times the number of colours, plus
-    the colour of the site.
+    The runtime marks each site near seams with a code. The code is m·c + k, where m is the bit mask of these seams, c
+    the number of colours, and k the colour of the site.
     """
     return None if sweep.window is None else sweep.window * sites.colours
 
 
 def wide(sites: Sites, sweep: Sweep) -> bool:
-    """Whether a sweep over a row may write beyond its end, up to a whole SIMD vector.
+    """Whether a sweep over a row may write beyond the end of the row, up to a whole SIMD vector.
 
     This is possible where the halo behind the row is filled after the sweep.
     """
@@ -59,8 +60,9 @@ def wide(sites: Sites, sweep: Sweep) -> bool:
 
 
 def chosen_ends(step: Sweeps) -> set[str]:
-    """Return which sites of a bond must have the colour of a sweep, in all sums of the step: values of
-    `Ends.chosen`."""
+    """Return the values of `Ends.chosen` in the sums of the step: which sites of a bond must have the colour of a
+    sweep.
+    """
     gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
     return {ends.chosen for gather in gathers for ends in gather.ends}
 
@@ -124,10 +126,9 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 
 
 def ways(step: Sweeps) -> list[tuple[int, int]]:
-    """Return a pair of parts for each flow of a step: the part of this flow, and the part of the next flow.
+    """Return for each flow of a step the pair (part of this flow, part of the next flow).
 
-    The last flow of a step is merged with the first flow of the next step. The last pair of the result belongs to this
-    merged flow.
+    The last flow of a step is merged with the first flow of the next step. The last pair belongs to this merged flow.
     """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
@@ -145,7 +146,7 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether a row can receive cotangents from other rows than those that it reads, because of open ends."""
+    """Whether open ends let a row receive cotangents from rows that it does not read."""
     return any(step.sites.open[:-1])
 
 

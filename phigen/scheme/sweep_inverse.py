@@ -74,12 +74,11 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
 
 
 def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
-    """Return a transposed kernel without those factors that are 0 if a term of H extends beyond an open end,
-    else 1.
+    """Return a transposed kernel in which some factors for open ends are omitted.
 
-    Factors are omitted in values that a site stores for a neighbour; the values for many neighbours are then often the
-    same. A factor can be omitted if it is 1 at every site that has this neighbour. It cannot be omitted if the term
-    extends beyond the neighbour.
+    A factor is 0 if a term of H extends beyond an open end, else 1. Factors are omitted in values that a site stores
+    for a neighbour; the values for many neighbours are then often the same. A factor can be omitted if it is 1 at every
+    site that has this neighbour. It cannot be omitted if the term extends beyond the neighbour.
     """
 
     def without_weights(name: str, value: Expression) -> Expression:
@@ -130,7 +129,7 @@ def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dic
 
 
 def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
-    """Return the increment of the inverse of x ↦ x + cx + b, where x is a field and the ``change`` cx + b is given.
+    """Return the increment of the inverse of the map x ↦ x + cx + b of a field x; ``change`` is cx + b.
 
     Returns None if c or b depends on fields that the sweep updates.
     """
@@ -141,12 +140,11 @@ def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression)
 
 
 def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
-    """Return a transposed kernel that recomputes fields as two kernels: one computes cotangents, the other the fields
-    before.
+    """Return a transposed kernel that recomputes fields as two kernels, for cotangents and for fields.
 
-    Then only the second kernel reads the sums over bonds or pairs, and these can be computed in one loop with the
-    cotangents of the bonds or pairs. Returns None if the cotangents depend on these sums, or if no fields are
-    recomputed.
+    The second kernel computes the fields before the sweep, and only this kernel reads the sums over bonds or pairs. So
+    these sums can be computed in one loop with the cotangents of the bonds or pairs. Returns None if the cotangents
+    depend on these sums, or if no fields are recomputed.
     """
     cotangent_outputs = tuple(o for o in transpose.outputs if o.name != STATE_BEFORE)
     state_outputs = tuple(o for o in transpose.outputs if o.name == STATE_BEFORE)

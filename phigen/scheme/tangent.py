@@ -48,11 +48,11 @@ def curvature(system: System, generating: GeneratingFunction, coefficients: Coef
 
 
 def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """Return the recurrences of a path ṁ = π(m)p together with its variation v, which is due to variations of its start
-    and of p.
+    """Return the recurrences of a path ṁ = π(m)p together with its variation v.
 
-    With the variation w of p, v̇ = ∂_m(π(m)p) v + π(m) w. The coordinates of the recurrences are the x, then the
-    ``v:x``; the symbol of w is the momentum of ``v:x``.
+    v is due to variations of the start and of p. With the variation w of p, v̇ = ∂_m(π(m)p) v + π(m) w. The coordinates
+    of the recurrences are first the x, then the ``v:x``, which are the components of v. The components of w have the
+    symbols of the momenta of ``v:x``.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]
