@@ -45,10 +45,10 @@ PACKS_PER_GROUP = 4
 #: of three steps.
 MEMBER_BATCHES = 4
 
-#: Largest number of stages for which members of an ensemble are integrated in batches. The second limit applies if
-#: kernels call functions and the iteration for a single trajectory has only momenta as unknowns: in a batch, the
-#: iteration has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski
-#: top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
+#: Members of an ensemble are integrated in batches up to this number of stages. The second number applies if kernels
+#: call functions, and if the iteration for a single trajectory has only momenta as unknowns. In a batch this iteration
+#: has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski top 1.13
+#: with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -181,15 +181,15 @@ def in_lanes(program: Program) -> Lanes | None:
 def _is_lowered(program: Program) -> bool:
     """Whether several steps of a trajectory, or several members, may be computed together in lanes.
 
-    With noise, coefficients differ from step to step, so that predictors from earlier steps fail. If H depends on the
-    time, coefficients differ as well, and the members of a batch could not share them.
+    They may not with noise: coefficients then differ from step to step, so that predictors from earlier steps fail. If
+    H depends on the time, coefficients differ as well; then lanes are used only for implicit steps without a monitor.
     """
     dated = program.time and (program.monitor or not program.step.kind.implicit)
     return program.lanes and program.offers("lanes") and not program.noise and not dated
 
 
 def _of_newton(program: Program, step: Newton) -> Blocks | None:
-    # The predictors of blocks of steps are recurrences, so the target must have these.
+    # Blocks of steps have recurrences as predictors, so the target must offer recurrences.
     return _newton(program, step) if _is_lowered(program) and program.offers("recurrences") else None
 
 
@@ -197,14 +197,13 @@ def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
     """Return blocks of steps, if several steps can be solved together. Otherwise return the paths for the
     reverse pass.
 
-    Returns None if there are no blocks, and paths are not computed in lanes: in single precision, or if the spec
-    excludes lanes.
+    In single precision, or if the spec excludes lanes, None takes the place of the paths.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)
     if blocks or program.single or not program.lanes:
-        return blocks  # the code of paths in lanes assumes numbers of 64 bits
+        return blocks  # the other code of paths in lanes assumes numbers of 64 bits
     return _traces(program, step)
 
 
@@ -252,7 +251,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        if not (program.extras.tangent or step.adjoint):  # the code uses differences of sweeps in place of derivatives
+        if not (program.extras.tangent or step.adjoint):  # without derivatives, the code uses differences of sweeps
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())

@@ -1,4 +1,5 @@
-"""Transposes of flows that recompute the state before a flow from the state after it, by the inverse flow.
+"""Transposes of flows. They receive the state after a flow, and recompute the state before it by the inverse
+flow.
 
 With these transposes, the reverse pass of members of an ensemble stores few states.
 """
@@ -17,10 +18,10 @@ from phigen.symbolic.expression import ZERO, symbol, symbols_of
 
 
 def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, ...]:
-    """Return transposes of flows, which read the state after the flow. An additional output, `STATE_BEFORE`, is the
-    state before the flow.
+    """Return transposes of flows that read the state after the flow.
 
-    Returns () if there are forces, or if coefficients for the step −h differ from those for h by more than their signs.
+    Their additional output `STATE_BEFORE` is the state before the flow. Returns () if there are forces, or if
+    coefficients for the step −h differ from those for h by more than their signs.
     """
     transposes, parities = step.adjoint.steps if step.adjoint else (), of_coefficients(step)
     coefficients = {s for flow in step.flows for s in symbols_of(*flow.roots)}

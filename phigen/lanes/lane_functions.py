@@ -1,4 +1,4 @@
-"""Elementary functions in loops over SIMD lanes: those with which a compiler can still vectorise a loop."""
+"""Elementary functions in loops over SIMD lanes. Some of them prevent a compiler from vectorising a loop."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from phigen.scheme.lowering import expand_powers
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.functions import FUNCTIONS
 
-#: LANE_FUNCTIONS have a vector version. LANE_FORMULAS are computed from functions with a vector version; they are given
-#: with their formulas.
+#: LANE_FUNCTIONS have a vector version. LANE_FORMULAS maps a function without one to a formula in terms of functions
+#: that have one.
 LANE_FUNCTIONS = tuple(f.name for f in FUNCTIONS.values() if f.lanes == f.name)
 LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in ("", f.name)}
 

@@ -50,7 +50,7 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
-    """Return a function of a degree, a `Source`, for the Taylor coefficients a_μ in p of ``alpha``.
+    """Return a `Source`: the function that maps a degree to the Taylor coefficients a_μ in p of ``alpha``.
 
     The components of ``alpha`` are expressions in x and p. They must be defined at p = 0 as they are written: they may
     contain no quotient such as sin(p)/p.
@@ -64,7 +64,10 @@ def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
 
 
 def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
-    """Return the Taylor coefficients ∂_p^μ f/μ! at p = 0 for |μ| ≤ degree; all coefficients of a polynomial in p."""
+    """Return the Taylor coefficients ∂_p^μ f/μ! at p = 0 for |μ| ≤ degree.
+
+    If f is a polynomial in p, all of its coefficients are returned.
+    """
     functions = Functions([f, *p])
     if not any(g.has(*p) for g in functions if g not in p):
         return {m: functions.expression(c) for m, c in functions.split(functions.element(f), p).items()}
@@ -80,7 +83,7 @@ def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
         raised = {}
         for index, g in level.items():
             last = max((k for k in range(n) if index[k]), default=0)
-            for k in range(last, n):  # only the last variable of the index, or later ones: so each index occurs once
+            for k in range(last, n):  # no variable before the last one of the index, so that each index occurs once
                 slope = derivative(g, variables[k]) / (index[k] + 1)
                 if slope != 0:
                     raised[_raised(index, k, 1)] = slope
@@ -113,7 +116,7 @@ def _coefficient(
         lambda k, j: momentum.combined(source[k], j) if k < len(x) else unit_shift.get(j, functions.ring.zero),
     )
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
-    # In a symmetric bi-realisation S_i = 0 for even i, but the sum need not look like 0 before relations are used.
+    # In a symmetric bi-realisation S_i = 0 for even i. Only relations between functions show that the sum is 0.
     zero = functions.seems_zero(coefficient) and functions.vanishes(coefficient)
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 

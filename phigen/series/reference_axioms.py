@@ -61,7 +61,10 @@ class _Parts:
         self._known: dict[tuple[int, int, int | None], Any] = {}
 
     def deviation(self, first: int) -> Series:
-        """Return α − x for ``first`` = 0, or β − x for ``first`` = n, as power series whose powers are degrees in p."""
+        """Return α − x for ``first`` = 0, or β − x for ``first`` = n, as power series in the degree in p.
+
+        The coefficient number k of the series is the part of degree k.
+        """
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
     def bracket(self, f: int, g: int, degree: int) -> Any:
@@ -92,7 +95,5 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Return the derivative by p_c of the part of degree ``degree`` in p; the part is that of component ``f`` of
-        (α, β).
-        """
+        """Return the derivative by p_c of the part of degree ``degree`` in p of component ``f`` of (α, β)."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

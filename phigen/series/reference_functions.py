@@ -96,7 +96,10 @@ class Functions:
         return self.ring.from_dict({monomial: c for monomial, c in result.items() if c})
 
     def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
-        """Return an element as a polynomial in some of the functions: {exponents: coefficient, an element}."""
+        """Return an element as a polynomial in some of the functions: a map from exponents to coefficients.
+
+        The coefficients are elements too.
+        """
         positions = [self.ring.gens.index(self._generators[f]) for f in variables]
         parts: dict[tuple[int, ...], dict[Any, Any]] = {}
         for m, c in element.items():

@@ -44,8 +44,8 @@ def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], 
 def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
     """Return one component of the part of π(m)p that has the degree ``degree`` + 1 in p.
 
-    It is the part of π(m) of degree ``degree``, times p. ``deviation`` is m − x. ``row`` has the Taylor coefficients of
-    the entries of π in the row of this component.
+    This part is p times the part of π(m) that has the degree ``degree``. ``deviation`` is m − x. ``row`` has the Taylor
+    coefficients of the entries of π in the row of this component.
     """
     return functions.total(
         deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
@@ -64,9 +64,9 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """Return a function of a degree, a `Source`, for the Taylor coefficients in p of α = m(0), or of β = m(1).
+    """Return a `Source`: the function that maps a degree to Taylor coefficients in p, for the end of a path.
 
-    ``time`` is 0 for α, 1 for β.
+    The end is α = m(0) for ``time`` 0, and β = m(1) for ``time`` 1.
     """
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)
