@@ -1,12 +1,13 @@
 """Elements of the group of rotations, and of rotations with translations, as formulas without cancellation.
 
 A rotation is represented by its unit quaternion (w, x, y, z) minus (1, 0, 0, 0), whose entries are small for small
-rotations. Let s = |p|², and φ be the function of `phigen.symbolic.special`. Then exp(p/2) is the quaternion (c, p/4)
-divided by its length, where c = 1 − φ(s/4)s/4. Its square exp(p) contains no root:
+rotations. For a rotation vector p, let s = |p|², and φ be the function of `phigen.symbolic.special`. Then exp(p/2) is
+the quaternion (c, p/4) divided by its length, where c = 1 − φ(s/4)s/4. Its square exp(p) contains no root:
 
     (c² − u, cp/2)/(c² + u),    u = s/16.
 
-The Cayley transform of p is (1, p/2) divided by its length. The translation of exp(p, t) is
+The Cayley transform of p is (1, p/2) divided by its length. Let t be the vector of a translation. The translation of
+exp(p, t) is
 
     (c(c² − u) t + c²/2 p×t + (c + 2c² + u − 4c³φ(s/4))/16 p (p·t))/(c² + u)²
 

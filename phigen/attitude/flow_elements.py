@@ -5,9 +5,9 @@ The gradients of Q and R must be constant along the flows of Q and R. Then the g
 exp(t∇R), times the rotation by C. The rotation by C does not change x, and the durations of the flows in a step add up
 to h. So it is applied once in a step.
 
-With forces, a monitor, noise, or a time in H, the rotation by C is not uniform. Then C has an element in each flow, as
-Q and R have. If a flow is composed of commuting flows, its element is the product of their elements. Elements of free
-rigid bodies are in `phigen.attitude.free_bodies`.
+With forces, a monitor, or a time in H, the rotation by C is not uniform. Then C has an element in each flow, as Q and R
+have. The same holds for a Casimir in the Hamiltonian of a noise source. If a flow is composed of commuting flows, its
+element is the product of their elements. Elements of free rigid bodies are in `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
@@ -99,10 +99,9 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
 
 
 def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
-    """Return a function of ``sign`` times the angle, or twice the angle if ``double``, in terms of sin and 1 − cos of
-    the angle.
+    """Return ``sin``, ``cos`` or ``versin`` of ``sign`` · ``angle``, written with sin and 1 − cos of the angle.
 
-    ``function`` is ``sin``, ``cos`` or ``versin``, which is 1 − cos.
+    ``versin`` is 1 − cos. If ``double``, the argument is twice as large.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if double:
@@ -156,9 +155,10 @@ def turning_of(
 
 
 def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning]:
-    """Yield ways to write h as a sum: h alone; with a multiple of |m|²/2 as a term; with a multiple of a Casimir.
+    """Yield ways to write h as a sum.
 
-    m is the angular momentum.
+    The first way is h alone. In other ways, a multiple of |m|²/2 or of a Casimir is one term, and the rest of h is the
+    other. m is the angular momentum.
     """
     yield Turning(ZERO, (h,))
     if not group.matrices and group.vectors:

@@ -1,8 +1,9 @@
 """The group element of the exact flow of a free rigid body, by an elliptic integral of the third kind.
 
-Let x be the momentum in the body, ẋ = x × ω with ω_i = w_i x_i, and x' its value after the time t. The rotation from
-the body at time t to the body at time 0 takes x' to x. It is the product of the shortest rotation M that takes x' to x,
-and of a rotation about x by the angle θ|x|. As a quaternion that is not of unit length,
+Let x be the momentum in the body. It satisfies ẋ = x × ω with ω_i = w_i x_i. Let x' and ω' be the values of x and ω
+after the time t. The rotation from the body at time t to the body at time 0 takes x' to x. It is the product of two
+rotations: M, the shortest one that takes x' to x, and a rotation about x by the angle θ|x|. As a quaternion that is not
+of unit length,
 
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
@@ -115,17 +116,16 @@ class _SortedAxes:
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """The factors of the time t and of the elliptic integral in the angle θ of the rotation: w_l and −β_h n."""
+        """Two factors in the formula for θ: w_l multiplies the time t, and −β_h n the elliptic integral."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the point in the plane whose polar angle is χ, a part of the angle θ; its second coordinate is divided
-        by L.
+        """Return the point in the plane whose polar angle is χ; its second coordinate is divided by L.
 
-        The formula is that of this module; the arguments are its Q, 1, T², S, C and D. If ``unit`` and ``square`` are 1
-        and T² times a common factor, the point is multiplied by this factor, which does not change χ.
+        The formula is that of this module. ``q``, ``s``, ``c`` and ``d`` are Q, S, C and D there, ``square`` is T², and
+        ``unit`` is 1. To avoid a division, ``unit`` and ``square`` may have a common factor, which does not change χ.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse
@@ -146,11 +146,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression for M, the shortest rotation that takes x' to x, as a quaternion of any
-    length.
+    """Yield pairs of a label and an expression for the shortest rotation that takes x' to x.
 
-    All expressions vanish if M x' = x and if, up to the length of M, Ṁ = M(ω − θ̇x')/2 for any angular velocity ω, with
-    the θ̇ of this module.
+    M is this rotation as a quaternion of any length. All expressions vanish if M x' = x and if, up to the length of M,
+    Ṁ = M(ω − θ̇x')/2 for any angular velocity ω, with the θ̇ of this module.
     """
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]

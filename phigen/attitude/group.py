@@ -147,7 +147,7 @@ def _components(algebra: LieAlgebra, i: int, j: int, triple: Sequence[int]) -> d
 
 
 def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
-    """Return the entries of a row by the position of their index in ``triple``; an index outside of it has the position
+    """Return the entries of a row by the position of their index in ``triple``; other indices have the position
     −1.
 
     Entries that are numbers become Python numbers.

@@ -2,9 +2,9 @@
 loops.
 
 By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix with N rows. So all powers of P, and the series
-of exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors satisfy a recurrence. This takes N − 2 products of
-matrices. Up to signs, the q_j are the elementary symmetric functions of the eigenvalues. They follow from the traces of
-powers of P by Newton's identities.
+of exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors satisfy a recurrence. Computing P², …, P^{N−1} takes
+N − 2 products of matrices. Up to signs, the q_j are the elementary symmetric functions of the eigenvalues. Newton's
+identities give them from the traces of powers of P.
 
 In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) = 1 +
 sin(√s)/√s P + (1 − cos √s)/s P², for any s.
@@ -71,7 +71,7 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
 
 
 def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
-    """Return the powers P, …, P^{N−1} of P = Σ p_i E_i, a matrix with N rows."""
+    """Return P, P², …, P^{N−1} for the matrix P = Σ p_i E_i with N rows."""
     rows = group.rows
     powers = [group.generator(p)]
     while len(powers) < rows - 1:

@@ -202,10 +202,10 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression; all expressions vanish if the free rigid bodies of a part of H do not
-    move in the flows of its other terms.
+    """Yield pairs of a label and an expression: the rates of the coordinates of free rigid bodies.
 
-    The expressions are the rates of the coordinates of these bodies.
+    The bodies belong to a part of H; the rates are those in the flows of the other terms of the part. If all
+    expressions vanish, these flows do not move the bodies.
     """
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
@@ -214,9 +214,10 @@ def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]
 
 
 def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of α_i = ±(w_k − w_j) for free rigid bodies.
+    """Yield the residuals of α_i = ±(w_k − w_j) for free rigid bodies, for cyclic (i, j, k).
 
-    w are the second derivatives of H (inverse moments of inertia), and α the factors in the body's attitude increment.
+    The w_i are the second derivatives of H (inverse moments of inertia). The α_i are factors in the attitude increment
+    of the body.
     """
     for body in turning.bodies:
         w = [derivative(derivative(body.hamiltonian, c), c) for c in body.coordinates]
@@ -240,10 +241,10 @@ def exponential_statement(system: System, group: Group, turning: Turning, name: 
 
 
 def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:
-    """Yield the statements for attitudes that are matrices: the matrices of the group represent the bracket, and the
-    attitude increment is the exponential, or the Cayley transform, of the matrix of p.
+    """Yield the statements for attitudes that are matrices.
 
-    The second statement is left out if steps follow paths.
+    The first says that the matrices of the group represent the bracket. The second says that the attitude increment is
+    the exponential, or the Cayley transform, of the matrix of p; it is left out if steps follow paths.
     """
     algebra = system.lie_algebra
     assert algebra is not None
@@ -356,11 +357,12 @@ def element_statements(
 def _residuals(
     group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
 ) -> Iterator[tuple[str, Expression]]:
-    """Yield residuals that are 0 if a step conserves the momentum, in the frame in which it is constant.
+    """Yield residuals that are 0 if a step conserves the momentum.
 
-    They are the values of the momentum, or of each rotated vector, after the step minus the values before. They are
-    multiplied by |g₀|²|τ|², for the quaternions g₀ of the attitude before the step and τ of the attitude increment. For
-    se(3) the residuals of the angular momentum are computed for g₀ = 1, and are multiplied by |τ|⁴.
+    The momentum is taken in the frame in which it is constant. A residual is the momentum, or a rotated vector, after
+    the step minus its value before the step. It is multiplied by |g₀|²|τ|², for the quaternions g₀ of the attitude
+    before the step and τ of the attitude increment. For se(3) the residuals of the angular momentum are computed for g₀
+    = 1, and are multiplied by |τ|⁴.
     """
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)

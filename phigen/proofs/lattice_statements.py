@@ -35,8 +35,8 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
 def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
     """Return the statements on the method of a lattice, by the name of the group.
 
-    For a splitting they are on the parts of H and their flows, for a series on the bi-realisation and on the equation
-    of a stage.
+    The statements for a splitting concern the parts of H and their flows. Those for a series concern the bi-realisation
+    and the equation of a stage.
     """
     cell, plan = compilation.cell, compilation.sweeps
     group = f"{METHOD} ({plan.kind})" if plan.is_implicit else SPLITTING

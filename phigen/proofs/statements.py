@@ -82,7 +82,9 @@ def damping_of(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def damping_of_lattice(spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Return the statement λ ≥ 0 of `damping` for a lattice, if λ depends only on parameters that are one number."""
+    """Return the statement λ ≥ 0 of `damping` for a lattice, if λ depends only on parameters that are equal at all
+    sites.
+    """
     return damping(spec, _defaults(spec, *spec.runs.values()))
 
 
@@ -126,8 +128,8 @@ def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     """Return the statements on the method of a compilation, by group, and those on its attitude.
 
-    For a splitting they are on its flows, for a series on the axioms of the bi-realisation and on the Hamilton–Jacobi
-    equation, for Gauss collocation on its stages.
+    The statements for a splitting concern its flows, and those for Gauss collocation its stages. Those for a series
+    concern the axioms of the bi-realisation and the Hamilton–Jacobi equation.
     """
     return compilation.by_kind(_method_by_series, _method_by_splitting, _method_by_gauss) | _attitude(compilation)
 
