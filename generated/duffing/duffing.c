@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 0c6ce84aa5657a3a61a14fa7c16da3bffefc7f2f6c505eae42a8cea4d3f51141
+ * body-sha256: 2862372d2781237642ad84c0150ce2b1c429ab2facfbafc9445793b0e946b79b
  */
 #include "duffing.h"
 #include <float.h>
@@ -232,7 +232,7 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define duffing_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define duffing_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -261,7 +261,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 #define duffing_FLOOR 1e-6 /* a correction is relative to |y_i| + this fraction of the largest |y_j| */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
-/* corrections below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define duffing_SHRINKING 0.25
 
 /* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32cb257fc349b55b8c090f2d517ec2306e08c2a811de2019cf4e483fc7247085
+ * body-sha256: ee8fe010c6a73588efe78d3765f86448bfa7be4a50119cbc8fc2283fcc87c77c
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -181,10 +181,10 @@ const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
+/** Corrections below NEARLY_SOLVED that do not shrink by this factor are rounding. */
 const SHRINKING = 0.25;
 
-/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
+/** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
 /** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;

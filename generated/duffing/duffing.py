@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 76419abe64f3815d40b054eb622b8eb8580cd744286c17651b7ee1ea614b33f9
+# body-sha256: 59a09fdeb093b5a45722e6f19f23ece5364b1573d618d02d4d3fbed813713060
 import numpy as np
 
 VERSION = "0.1.0"
@@ -212,7 +212,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
@@ -241,7 +241,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # a correction is relative to |y_i| + this fraction of the largest |y_j|
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
-SHRINKING = 0.25  # corrections below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # corrections below NEARLY_SOLVED that do not shrink by this factor are rounding
 
 
 def _size(y, delta):

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: c7aff39b7fcc626d71cd21e009e4ecd5248edd64b3e2d18504747f6d2080024a
+ * body-sha256: 3cff0f4beb640cd116b00a48c62d316f02b8087f8677c9b466d301bac5b495a6
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -214,7 +214,7 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-#define guiding_centre_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define guiding_centre_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -454,13 +454,13 @@ enum {
 #define guiding_centre_NEGLIGIBLE 1e-17
 /* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define guiding_centre_LEAST_SHARE 1e-5
-/* largest rounding error of the slope at the end of a path, relative to end and slope */
+/* largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the square root of rounding */
 #define guiding_centre_DIFFERENCE 1e-7
 #define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define guiding_centre_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
-/* residuals below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* residuals below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define guiding_centre_SHRINKING 0.25
 /* a Jacobian is useful if an iteration multiplies the residual by no more than this */
 #define guiding_centre_CONTRACTING 0.05

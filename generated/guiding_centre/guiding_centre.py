@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cc3cdbd905687c038594136cc556b819919830ca2ea951d28cd9a08f388798bd
+# body-sha256: 69c9c4dad3d768a3188b21c4bdd3e6d304617d539331338f6f0ad4761c4249ec
 import numpy as np
 
 VERSION = "0.1.0"
@@ -182,11 +182,11 @@ MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps tha
 PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
 LEAST_SHARE = 1e-5  # terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|
-ROUNDED_SLOPE = 2e-15  # largest rounding error of the slope at the end of a path, relative to end and slope
+ROUNDED_SLOPE = 2e-15  # largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the square root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
-SHRINKING = 0.25  # residuals below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # residuals below NEARLY_SOLVED that do not shrink by this factor are rounding
 CONTRACTING = 0.05  # a Jacobian is useful if an iteration multiplies the residual by no more than this
 
 
@@ -474,7 +474,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 

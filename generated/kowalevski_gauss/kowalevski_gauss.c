@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: fd9ff13f9d6f417c27ba164cd4903453009bb86d6c007ea586b1825cbfebb4af
+ * body-sha256: 16691d73d3b7edd9bb9bd51ee83b6f94a25db122c155c20a9cab067aa008edd8
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -529,7 +529,7 @@ enum {
     /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,
 };
-/* largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly */
+/* sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift */
 #define kowalevski_gauss_SOLVED 2e-18
 /* above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted */
 #define kowalevski_gauss_STALLED 0.8

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fb22cd99d47cdb9053d216f3e6fb73a12eff8469cd65b4f1490436b31b06690d
+# body-sha256: 75ccd5559077904ab7c109826c2e1709cdf204e9b2a90810d0c9682bed9fa029
 import numpy as np
 
 VERSION = "0.1.0"
@@ -176,8 +176,7 @@ def _stage_change(coef, x, z):
 
 
 def _next_frame(coef, x, z, k):
-    """Derivatives k of the unknowns, in the frame at the end z of a step, where the next step
-    starts."""
+    """Derivatives k of the unknowns, transformed to the frame of the end z of a step."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]
@@ -201,7 +200,7 @@ def _next_frame(coef, x, z, k):
 
 
 MOST_RISING = 3  # a step fails if the change grows in (number of stages + this) sweeps in a row
-SOLVED = 2e-18  # largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly
+SOLVED = 2e-18  # sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
 ROUNDING = 4e-16  # below this, sweeps end when a change exceeds STALLED times the one before
 NEARLY_ROUNDING = 2e-14  # below this, sweeps end at the second change that is not smaller than the one before

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 9a9d7b52d1b5e76fbb35b2d27db8b0a5f28bcb436e0c763008335f8fde53a166
+ * body-sha256: 437fd1f21ae9e64cd864b9f290582b5b8d01ee03004f3b412af59c63fa027aed
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -418,8 +418,7 @@ static void point_vortices_copy(double *const *to, double *const *from, const po
 enum {
     point_vortices_PATIENCE = 10, /* sweeps before Newton's method may replace slow sweeps */
 };
-/* fields count as at least this fraction of the largest field */
-#define point_vortices_LEAST_SIZE 0.001
+#define point_vortices_LEAST_SIZE 0.001 /* smaller fields count as this share of the largest */
 #define point_vortices_SETTLED 0x1p-55  /* expected relative change of y below which sweeps end */
 #define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
 /* convergence is slow if a change exceeds this fraction of the change before */

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: da3b2dd81fa5426dffb8369a4243e626ea5dbb4cc749395ac1bf29977e5753f4
+# body-sha256: d4539a697107e03a63667e976f2318c5be653285d52c4f25edc898919f05b518
 import numpy as np
 
 VERSION = "0.1.0"
@@ -124,7 +124,7 @@ class _Sites:
 MOST_SWEEPS = 200
 DIFFERENCES = 4  # number of differences in the predictor of a stage
 PATIENCE = 10  # sweeps before Newton's method may replace slow sweeps
-LEAST_SIZE = 0.001  # fields count as at least this fraction of the largest field
+LEAST_SIZE = 0.001  # smaller fields count as this share of the largest
 SETTLED = 2.0**-55  # expected relative change of y below which sweeps end
 ROUNDING = 2.0**-40  # changes below this may be rounding
 SLOW = 0.6  # convergence is slow if a change exceeds this fraction of the change before

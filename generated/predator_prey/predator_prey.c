@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 7c2de3f50906fadd5c45bfea5f47b227e56e298fe00fbf297e48af0288581b86
+ * body-sha256: 5596264c3d40dc15e42253febb89917c8274cf31dae0e6360da2ab90f06cc29f
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -206,7 +206,7 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define predator_prey_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -235,7 +235,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 #define predator_prey_FLOOR 0.0 /* a correction is relative to |y_i| + this fraction of the largest |y_j| */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
-/* corrections below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define predator_prey_SHRINKING 0.25
 
 /* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 607aea100ee05b8b1e637add7b80a4cce42a97611d715671c6a91f6aa0ded292
+# body-sha256: 5e8e5dcee425104ee7d91d9dccc79fe2f0e121916d34e9a853e3a32686105175
 import numpy as np
 
 VERSION = "0.1.0"
@@ -206,7 +206,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
@@ -235,7 +235,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 0.0  # a correction is relative to |y_i| + this fraction of the largest |y_j|
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
-SHRINKING = 0.25  # corrections below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # corrections below NEARLY_SOLVED that do not shrink by this factor are rounding
 
 
 def _size(y, delta):

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 693e92df2ec4cdbc6ffa0abcb1ab798d3140eb7373acf34d3b3d2e966e47d16c
+ * body-sha256: af3c119e87bb3068bae3d5fd874259a621db8b5264c4b98bacdaa835e7c1f8ba
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -233,7 +233,7 @@ static void quaternion_top_generate(const double coef[47], const double y[7], do
     jacobian[48] = 1.0 - 0.5 * (t71 - t97 - t123);
 }
 
-/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C. */
 static void quaternion_top_products(const quaternion_top_params *params, const double x[7], double out[3])
 {
     const double m1 = x[0], m2 = x[1], m3 = x[2], w = x[3], x_ = x[4], y = x[5], z = x[6];
@@ -379,7 +379,7 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-#define quaternion_top_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define quaternion_top_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -686,13 +686,13 @@ enum {
 #define quaternion_top_NEGLIGIBLE 1e-17
 /* terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j| */
 #define quaternion_top_LEAST_SHARE 1e-5
-/* largest rounding error of the slope at the end of a path, relative to end and slope */
+/* largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt */
 #define quaternion_top_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the square root of rounding */
 #define quaternion_top_DIFFERENCE 1e-7
 #define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define quaternion_top_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
-/* residuals below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* residuals below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define quaternion_top_SHRINKING 0.25
 /* a Jacobian is useful if an iteration multiplies the residual by no more than this */
 #define quaternion_top_CONTRACTING 0.05

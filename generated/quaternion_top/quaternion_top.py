@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f9a6f745e1bfff0be9fd0891697cd4c156c4d814fef2aff287138eb25074fd22
+# body-sha256: 4b58ccdec64dfc557e5b26dbabc204f13bafa47c8bdfc0055156d7310acd3f2e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -449,11 +449,11 @@ MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps tha
 PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
 LEAST_SHARE = 1e-5  # terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|
-ROUNDED_SLOPE = 2e-15  # largest rounding error of the slope at the end of a path, relative to end and slope
+ROUNDED_SLOPE = 2e-15  # largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the square root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
-SHRINKING = 0.25  # residuals below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # residuals below NEARLY_SOLVED that do not shrink by this factor are rounding
 CONTRACTING = 0.05  # a Jacobian is useful if an iteration multiplies the residual by no more than this
 
 
@@ -825,7 +825,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
@@ -921,8 +921,7 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
-    gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 21f58512ca7f16c9b37e36720ad3a0006f5c3e6194be5bd2a159c18b4f6f9858
+ * body-sha256: 67150e513820ba9c0291a3a8044a65a663e0212c744854fce3e6356b971130c5
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -313,7 +313,7 @@ static void rigid_body_guide(const rigid_body_params *params, const double gauge
     error[2] = x1 * t24 - x2 * t27;
 }
 
-/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C. */
 static void rigid_body_products(const rigid_body_params *params, const double x[3], double out[restrict 3])
 {
     const double x1 = x[0], x2 = x[1], x3 = x[2];
@@ -636,7 +636,7 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define rigid_body_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define rigid_body_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -665,7 +665,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 #define rigid_body_FLOOR 1e-6 /* a correction is relative to |y_i| + this fraction of the largest |y_j| */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
-/* corrections below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define rigid_body_SHRINKING 0.25
 
 /* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */

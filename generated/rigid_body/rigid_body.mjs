@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: db3518917a5640f226758c46a8ff281244f7e78b86fccd6c5a1d43154764bb61
+ * body-sha256: cadbcc22824b525bde3c5142285f649bac029b7af14762aeeea4c467ecbd29f9
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -410,7 +410,7 @@ function guide(params, gauge, x, error) {
   error[2] = x1 * t24 - x2 * t27;
 }
 
-/** The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
+/** The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C. */
 function products(params, x, out) {
   const x1 = x[0];
   const x2 = x[1];
@@ -460,10 +460,10 @@ const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
+/** Corrections below NEARLY_SOLVED that do not shrink by this factor are rounding. */
 const SHRINKING = 0.25;
 
-/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
+/** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
 /** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 68ac981910f1d90af24d69120219ede430566d6a6d72bf2889e33bc6143c5b59
+# body-sha256: bf9a8fbbde49db53def0df1f4da1781f0a54c4f30f87f633fff8dd690161dfbc
 import numpy as np
 
 VERSION = "0.1.0"
@@ -458,7 +458,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
@@ -487,7 +487,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # a correction is relative to |y_i| + this fraction of the largest |y_j|
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
-SHRINKING = 0.25  # corrections below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # corrections below NEARLY_SOLVED that do not shrink by this factor are rounding
 
 
 def _size(y, delta):
@@ -682,8 +682,7 @@ def _guide(parameters, gauge, x):
 
 
 def _products(parameters, x):
-    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
-    gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: a9f46933892f2d9e9551fea93e0abe31473196da45925d0e28172cbd5677b5af
+ * body-sha256: d93615887c5560ccf87bd1ced11dadca6a0a828cb5f750bece1b4124f1cf5fd3
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -259,7 +259,7 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5         /* steps up to this are accepted, relative to |x| + |h dx/dt| */
+#define thermal_spin_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
@@ -292,7 +292,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 #define thermal_spin_FLOOR 1e-6 /* a correction is relative to |y_i| + this fraction of the largest |y_j| */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
-/* corrections below NEARLY_SOLVED are rounding if their ratio exceeds this */
+/* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define thermal_spin_SHRINKING 0.25
 
 /* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2b139b4c665a205a0d3992930e768e44d404d852b32c6972b6509dd8cf798bb6
+ * body-sha256: 16cd82fe89fc8cfdc751f79e8dca4c97b1e2d927ee957e3caa48935eb1a105a5
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -279,10 +279,10 @@ const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Corrections below NEARLY_SOLVED are rounding if their ratio exceeds this. */
+/** Corrections below NEARLY_SOLVED that do not shrink by this factor are rounding. */
 const SHRINKING = 0.25;
 
-/** Steps up to this are accepted, relative to |x| + |h dx/dt|. */
+/** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
 /** Longer steps may change the energy by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 01eb7ec4697dabec8f9b3f878b273cb8121fe082b662de641ee2f9ae9d6541c7
+# body-sha256: de049cbb6d9538d097f5513dbb2d741703f08b791c7408bfc7e797f4ebd0cc23
 import numpy as np
 
 VERSION = "0.1.0"
@@ -300,7 +300,7 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # steps up to this are accepted, relative to |x| + |h dx/dt|
+PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
 MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
 
 
@@ -331,7 +331,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # a correction is relative to |y_i| + this fraction of the largest |y_j|
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
-SHRINKING = 0.25  # corrections below NEARLY_SOLVED are rounding if their ratio exceeds this
+SHRINKING = 0.25  # corrections below NEARLY_SOLVED that do not shrink by this factor are rounding
 
 
 def _size(y, delta):

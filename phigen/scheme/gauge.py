@@ -290,7 +290,7 @@ def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
     )
     scale = Kernel(
         "products",
-        "the products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge",
+        "the products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir C",
         {"params": system.parameter_names, "x": system.coordinates},
         (Output("out", tuple(products)),),
     )

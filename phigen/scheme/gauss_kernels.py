@@ -123,7 +123,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
     return Kernel(
         "next_frame",
-        "derivatives k of the unknowns, in the frame at the end z of a step, where the next step starts",
+        "derivatives k of the unknowns, transformed to the frame of the end z of a step",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "k": slopes},
         (Output("seen", tuple(coefficients.hoist(values))),),
     )

@@ -186,7 +186,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
         ),
         Kernel(
             "substitute",
-            "the solution for a right-hand side, from the factors, and the product of the slope and the solution",
+            "the solution for a right-hand side, from the factors, and the matrix slope times the solution",
             {"factor": tuple(e.value for e in factor_symbols.values), "slope": _entries("K", n), "side": side},
             (Output("solution", tuple(solution)), Output("product", tuple(product))),
         ),
@@ -208,7 +208,7 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
         ]
     return Kernel(
         "invert",
-        "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
+        "elimination without pivoting: the inverse, the matrix slope times the inverse, reciprocals of the pivots",
         {"matrix": _entries("J", n), "slope": _entries("K", n)},
         (Output("inverse", tuple(entries)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
     )

@@ -71,7 +71,7 @@ class Logarithmic:
 def fact_of(negative: str) -> str:
     """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is the negative part of
     H as text."""
-    return f"monitor: log; steps equal in tau, of K = log(A + e) - log(-B) with H = A + B, e = -H(x0), B = {negative}"
+    return f"monitor: log; steps of K = log(A + e) - log(-B), equal in tau, with H = A + B, e = -H(x0), B = {negative}"
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:

@@ -58,9 +58,9 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
     """Yield the line about the monitor in the header of generated files, if there is a monitor."""
     if monitor and forced:
-        yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau, and do not depend on e"
+        yield f"monitor: dt = g dtau with g = {monitor}; steps are equal in tau"
     elif monitor:
-        yield f"monitor: dt = g dtau with g = {monitor}; steps equal in tau, of K = g (H + e), e = -H(x0)"
+        yield f"monitor: dt = g dtau with g = {monitor}; steps of K = g (H + e), e = -H(x0), equal in tau"
 
 
 def monitor_of(spec: Spec) -> Expression | None:

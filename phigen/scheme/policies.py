@@ -62,7 +62,7 @@ class NewtonPolicy(Policy):
     """Newton's method for the implicit equation of a step; its tolerance is in `InnerSolve`."""
 
     nearly_solved: float = number(1e-8, "a correction below this may be rounding")
-    shrinking: float = number(0.25, "corrections below NEARLY_SOLVED are rounding if their ratio exceeds this")
+    shrinking: float = number(0.25, "corrections below NEARLY_SOLVED that do not shrink by this factor are rounding")
 
 
 @dataclass(frozen=True)
@@ -84,14 +84,14 @@ class PathPolicy(Policy):
         1e-5, "terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|"
     )
     rounded_slope: float = number(
-        2e-15, "largest rounding error of the slope at the end of a path, relative to end and slope"
+        2e-15, "largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt"
     )
     difference: float = number(
         1e-7, "difference of arguments in a difference quotient, relative to p: the square root of rounding"
     )
     solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
     nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
-    shrinking: float = number(0.25, "residuals below NEARLY_SOLVED are rounding if their ratio exceeds this")
+    shrinking: float = number(0.25, "residuals below NEARLY_SOLVED that do not shrink by this factor are rounding")
     contracting: float = number(
         0.05, "a Jacobian is useful if an iteration multiplies the residual by no more than this"
     )
@@ -104,7 +104,7 @@ class GaussPolicy(Policy):
 
     most_rising: int = count(3, "a step fails if the change grows in (number of stages + this) sweeps in a row")
     solved: float = number(
-        2e-18, "largest expected change by a further sweep; with 2e-17, energy and Casimirs drift linearly"
+        2e-18, "sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift"
     )
     stalled: float = number(
         0.8, "above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted"
@@ -131,7 +131,7 @@ class PlausibilityPolicy(Policy):
     energy.
     """
 
-    plausible: float = number(1.5, "steps up to this are accepted, relative to |x| + |h dx/dt|")
+    plausible: float = number(1.5, "accepted length of a step, relative to |x| + |h dx/dt|")
     max_energy_change: float = number(0.5, "longer steps may change the energy by at most this fraction")
 
 
@@ -182,7 +182,9 @@ class GaussTangentPolicy(Policy):
 class GaussAdjointPolicy(Policy):
     """Sweeps that solve the transposed linear equations of the stages of a Gauss step, for gradients."""
 
-    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
+    adjoint_solved: float = number(
+        1e-17, "sweeps end when a further one would change less than this, relative to the cotangents"
+    )
     adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
         1e-12, "below this, sweeps end at the second change that exceeds ADJOINT_STALLED times the one before"
@@ -205,7 +207,7 @@ class LatticeSweepPolicy(Policy):
 
     differences: int = count(4, "number of differences in the predictor of a stage")
     patience: int = count(10, "sweeps before Newton's method may replace slow sweeps")
-    least_size: float = number(1e-3, "fields count as at least this fraction of the largest field")
+    least_size: float = number(1e-3, "smaller fields count as this share of the largest")
     settled: float = number(2.0**-55, "expected relative change of y below which sweeps end")
     rounding: float = number(2.0**-40, "changes below this may be rounding")
     slow: float = number(0.6, "convergence is slow if a change exceeds this fraction of the change before")
