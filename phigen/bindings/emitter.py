@@ -1,5 +1,6 @@
-"""Files of a binding, a module in another language that calls the generated C; templates are in
-``templates/bindings``."""
+"""Files of a binding. A binding is a module in another language that calls the generated C. The templates of the files
+are in ``templates/bindings``.
+"""
 
 from __future__ import annotations
 
@@ -25,12 +26,12 @@ import let local macro module quote return struct true try using while"""
 
 @dataclass(frozen=True)
 class BindingLanguage:
-    """A language for which there are bindings: files, comments, number types, and reserved words.
+    """Language of a binding: its files, comments, number types and reserved words.
 
-    ``files`` maps file names, with NAME in place of the solver's name, to the templates of which a file consists.
-    ``comment`` begins a comment line. ``reals`` are the language's types for C's double and float. ``words`` are
-    reserved, and cannot be names of fields. ``caseless`` is true if the language does not distinguish upper and lower
-    case.
+    ``files`` maps the name of each file to the templates whose texts form the file; NAME in a file name stands for the
+    name of the solver. ``comment`` is the beginning of a comment line. ``reals`` are the types for C's double and
+    float. ``words`` are the reserved words of the language, which cannot be names of struct fields. ``caseless`` is
+    true if the language does not distinguish upper and lower case.
     """
 
     files: Mapping[str, tuple[str, ...]]
@@ -132,7 +133,7 @@ def _described(description: str, unit: str) -> str:
 
 
 def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
-    """Return, for each of the ``names``, a valid name of a field of a struct in the language.
+    """Return valid names of struct fields in the language, one for each of the ``names``.
 
     A reserved word, or a name that equals an earlier field, gets trailing underscores. In languages that do not
     distinguish upper and lower case, such as Fortran, a name that begins with an underscore gets the prefix "p".

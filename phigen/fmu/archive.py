@@ -53,10 +53,10 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
 
 
 def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, bytes]:
-    """Compile the FMU, and return the shared libraries as bytes, by the name of the platform.
+    """Compile the FMU for several platforms, and return the shared libraries as bytes, by name of the platform.
 
-    ``platforms`` are by default all platforms for which there is a compiler. Raises `ToolchainError` if a compilation
-    fails, or if there is no compiler for one of the ``platforms``.
+    ``platforms`` are the names of these platforms, by default of all platforms for which there is a compiler. Raises
+    `ToolchainError` if a compilation fails, or if there is no compiler for one of the ``platforms``.
     """
     available = compilers()
     unavailable = sorted(set(platforms) - set(available))
@@ -91,7 +91,7 @@ def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> b
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         for path, data in contents.items():
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # Unix: the file permissions in the archive are the same on all machines
+            entry.create_system = 3  # 3 is Unix; the default value depends on the machine that writes the archive
             entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(entry, data)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 VENDOR = "phigen"
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-#: Capabilities of the solver that ``modelDescription.xml`` states: names of attributes, by version of FMI.
+#: Names of the XML attributes in ``modelDescription.xml`` that state capabilities of the solver, by version of FMI.
 _ABILITIES = {
     2: ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"),
     3: (

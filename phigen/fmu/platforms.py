@@ -13,10 +13,10 @@ from phigen.runtime.toolchain import Compiler
 
 @dataclass(frozen=True)
 class Platform:
-    """Platform: names of its folder in FMUs of FMI 3.0 and 2.0, its name for the compiler zig, and the suffix of
-    libraries.
+    """Platform of an FMU: its names in FMI and for the compiler zig, and the suffix of its libraries.
 
-    ``folder_2`` is "" for platforms that FMI 2.0 does not define.
+    ``folder`` and ``folder_2`` are the names of its folder in FMUs of FMI 3.0 and FMI 2.0. ``folder_2`` is "" for
+    platforms that FMI 2.0 does not define. ``zig`` is the name that the compiler zig has for the platform.
     """
 
     folder: str
@@ -39,12 +39,12 @@ PLATFORMS = {
     )
 }
 
-#: Compiler flags. Without fused multiply-add, results differ between platforms only because their libm differ. Only the
-#: functions of FMI are exported, and debugging symbols are removed.
+#: Compiler flags. Fused multiply-adds are off, so results of two platforms differ only where their functions of libm
+#: differ. The library exports only the functions of FMI, and has no debugging symbols.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
-#: Time limit of a compilation in seconds. The limit includes the first use of zig for a platform, which builds
-#: libraries.
+#: Time limit of a compilation in seconds. When zig first compiles for a platform, it also builds the libraries of this
+#: platform within the limit.
 TIMEOUT = 1200.0
 
 _PACKAGE = "ziglang"

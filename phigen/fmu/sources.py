@@ -37,8 +37,11 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
-    """Return a hash of the solver and its first run, by which FMI checks that a library fits
-    ``modelDescription.xml``."""
+    """Return a hash of the files of the solver and of the first run of the spec.
+
+    ``modelDescription.xml`` and the compiled library both contain the hash. The library starts only if the two hashes
+    are equal.
+    """
     identity = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
     digest = hashlib.sha256(identity.encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

@@ -38,17 +38,19 @@ class Variable:
 
     @property
     def initial(self) -> str:
-        """The attribute ``initial`` of the variable in FMI: "exact", "calculated", or "" if its causality allows no
-        attribute."""
+        """The attribute ``initial`` of the variable in FMI: "exact", "calculated", or "" if FMI allows no attribute for
+        its causality.
+        """
         if self.causality in ("independent", "input"):
             return ""
         return "calculated" if self.start is None else "exact"
 
 
 def first_run(spec: Spec) -> Run:
-    """Return the first run of the spec with a positive step, which gives initial state, parameters and step of the FMU.
+    """Return the first run of the spec whose step is positive.
 
-    Raises `SpecError` for lattices, and for a spec without such a run.
+    The FMU has the initial state, the parameters and the step of this run. Raises `SpecError` for lattices, and for a
+    spec without such a run.
     """
     if spec.lattice:
         hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, which can become an FMU"
@@ -75,9 +77,9 @@ def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
-    """Return, by kind of variables, the number of the first variable of this kind.
+    """Return a dict with the number of the first variable of each kind, such as "STATE".
 
-    A kind without variables has the number of the next kind. ``END`` is the number of all variables.
+    A kind without variables has the number at which the next kind begins. The entry ``END`` is the last number plus 1.
     """
     numbers, number = {}, 0
     for kind, variables_of_kind in _kinds(compilation).items():
@@ -137,7 +139,7 @@ def _seed(program: Program, run: Run) -> Iterator[Variable]:
 
 
 def _attitude(program: Program) -> Iterator[Variable]:
-    """Yield the variables for the entries of the attitude, whose initial value is the identity."""
+    """Yield the variables for the entries of the attitude. The initial attitude is the identity."""
     if not program.attitude:
         return
     rows = program.attitude.group.rows

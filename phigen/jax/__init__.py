@@ -1,7 +1,7 @@
 """Runs of phigen as functions of JAX, with derivatives, for use with `jit` and `vmap`. Needs the package jax.
 
-`propagator` calls a compiled solver. `flow` integrates in JAX, with the bracket of a system and any function of JAX as
-H.
+`propagator` calls a compiled solver. `flow` integrates in JAX: a system supplies the bracket, and H is any function
+written in JAX.
 """
 
 from phigen.errors import MissingPackageError

@@ -1,9 +1,9 @@
-"""Gauss collocation in JAX: the step for the bracket of a system, with any function of JAX as H.
+"""Gauss collocation in JAX. A system supplies the bracket, and H is any function written in JAX.
 
-The stage equations of a step are solved by fixed-point iteration, whose iterations are called sweeps. The unknowns, the
-sweeps and the predictor are those of `phigen.gauss`. For derivatives JAX solves the linearised stage equations
-(tangents) or their transpose (cotangents), by further sweeps. So derivatives are those of the exact solution of the
-stage equations, to round-off; the sweeps of the step are not differentiated.
+The stage equations of a step are solved by fixed-point iteration; one iteration is called a sweep. The unknowns, the
+sweeps and the predictor are those of `phigen.gauss`. For derivatives JAX solves the linearised stage equations (for
+tangents) or their transpose (for cotangents), by further sweeps. The sweeps of the step itself are not differentiated.
+Derivatives are those of the exact solution of the stage equations, to round-off.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ GRADIENT = "gradient"
 #: Largest number of sweeps (fixed-point iterations) for a step or for a linear equation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds, in double precision, at which the iterations for a step and for a linear equation end.
+#: Thresholds, in double precision, that end two iterations: the sweeps of a step, and the sweeps for a linear equation.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
-#: Data of a run between two steps: the state x, its compensation term, and the increments of the last step, converted
-#: to increments of a step that starts at x.
+#: Data of a run between two steps: the state x, the compensation term of x, and increments that predict the next step.
+#: These increments are those of the last step, converted to a step that starts at x.
 Carry = tuple[Any, Any, Any]
 
 
 class _Traced(Arrays):
-    """Evaluator of symbolic expressions, whose symbols have arrays of JAX as values."""
+    """Evaluator of symbolic expressions with arrays of JAX as the values of their symbols."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__(values, jnp)
 
     def power(self, base: Any, exponent: Fraction) -> Any:
-        """Return a power of an array with a rational exponent, by products and roots if possible."""
+        """Return the power of an array with a rational exponent, computed by products and roots if possible."""
         if exponent.denominator == 1:
             return base ** int(exponent)
         return jnp.sqrt(base) ** exponent.numerator if exponent.denominator == 2 else super().power(base, exponent)
@@ -60,8 +60,9 @@ def rounding_of(dtype: Any) -> float:
 
 
 def tableau_of(dtype: Any, stages: int) -> Tableau:
-    """Return the coefficients of the Gauss method, rounded for double precision, or for single precision if dtype is
-    shorter."""
+    """Return the coefficients of the Gauss method: in double precision for double ``dtype``, else in single
+    precision.
+    """
     return tableau(stages, DOUBLE if rounding_of(dtype) == 1 else SINGLE)
 
 
@@ -110,15 +111,14 @@ class Collocation:
         }
 
     def start(self, x: Any) -> Carry:
-        """Return the data of a run at its start x, with compensation term 0 and increments 0, since there is no last
-        step."""
+        """Return the data of a run at its start x, where the compensation term and the increments are 0."""
         return x, jnp.zeros_like(x), jnp.zeros((len(self.points.unknowns), self.stages), x.dtype)
 
     def moves(self, table: Tableau, x: Any, moves: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return h b_j f_j as an array (unknowns, stages): f_j is the time derivative of the unknowns at stage j, b_j
-        its weight.
+        """Return the increments L_j = h b_j f_j of the stages j as an array (unknowns, stages).
 
-        ``moves`` are the current increments L_j, of the same shape, from which the unknowns at the stages follow.
+        f_j is the time derivative of the unknowns at stage j, and b_j is the weight of the stage. ``moves`` are
+        approximate increments of the same shape; the unknowns at the stages are computed from ``moves``.
         """
         z = moves @ jnp.asarray(table.mixing, x.dtype).T
         values = self._values(x, z, parameters)
@@ -151,9 +151,10 @@ class Collocation:
         return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(x, end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
-        """Return the sizes (unknowns, 1) to which changes of the unknowns are relative: |x| or 1.
+        """Return the sizes of the unknowns (unknowns, 1), to which errors of the unknowns are relative.
 
-        The size is |x| for unknowns that are coordinates or functionals of x, and 1 for all others.
+        The size is |x|, or 1 if x = 0, for unknowns with the scale of the state x. It is 1 for all other unknowns, such
+        as logarithms.
         """
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
@@ -161,10 +162,9 @@ class Collocation:
         return jnp.concatenate([jnp.broadcast_to(size, (self.points.plain,)), ones])[:, None]
 
     def _from_the_end(self, x: Any, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the increments of the step from ``x``, converted to increments of a step that starts at the end of
-        this step.
+        """Return the increments of the step from ``x``, converted so that they predict the next step.
 
-        The next step is predicted from these increments. ``end`` has the values of the unknowns at the end of the step.
+        ``moves`` are the increments, and ``end`` has the values of the unknowns at the end of the step.
         """
         if self._traced_value is None:
             return moves
@@ -180,22 +180,24 @@ def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
 
 
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
-    """Return (μ⁻¹)ᵀ, where μ is the matrix of weights that gives the unknowns at the stages from the increments.
+    """Return (μ⁻¹)ᵀ, the matrix that converts predicted unknowns to increments.
 
-    This matrix converts predicted unknowns to increments.
+    The matrix μ converts the increments of a step to the unknowns at the stages.
     """
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 
 
 def _largest(change: Any, scale: Any) -> Any:
-    """Return the largest norm over the stages of a change of the unknowns, relative to ``scale``."""
+    """Return the norm of a change of the unknowns, relative to ``scale``: the largest of the norms at the stages."""
     return jnp.sqrt(jnp.max(jnp.sum((change / scale) ** 2, axis=0)))
 
 
 def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float) -> Any:
-    """Return the solution L of F(L) = L, found by the iteration L ← F(L); NaN if the iteration does not converge.
+    """Return the solution L of F(L) = L, found by the iteration L ← F(L). Return NaN if the iteration does not
+    converge.
 
-    ``equation`` is the function F(L) − L. If the iteration diverges from ``start``, it begins again once, from 0.
+    ``equation`` is the function F(L) − L. The iteration begins at L = ``start``. If it diverges, it begins again once,
+    at L = 0.
     """
     solved_limit, rounding, near_rounding = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
     stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
@@ -229,7 +231,7 @@ def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float)
 
 
 def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of (F′ − 1) L = side; ``linear`` is the linear map F′ − 1.
+    """Return the solution L of A L = side; ``linear`` is the linear map A.
 
     JAX can transpose this function: the transposed equation is solved by the same iteration.
     """
@@ -239,7 +241,8 @@ def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
 
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of (F′ − 1) L = side, found by the iteration L ← F′L − side; ``linear`` is the map F′ − 1.
+    """Return the solution L of A L = side, found by the iteration L ← L + A L − side; ``linear`` is the linear
+    map A.
 
     The result is NaN if the iteration does not converge.
     """

@@ -1,4 +1,4 @@
-"""Runs of ẋ = π∇H in JAX, with the bracket of a system and any function of JAX as H; steps are Poisson maps."""
+"""Runs of ẋ = π∇H in JAX, by steps that are Poisson maps. A system supplies π, and H is any function written in JAX."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint of the error message for brackets without exact steps.
+#: Hint of the error message for brackets for which no Gauss step is known to be a Poisson map.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 
@@ -44,20 +44,22 @@ def flow(
     """Return the run of ẋ = π∇H as a function ``f(x0, *arguments, **parameters)``.
 
     π is the Poisson tensor of ``system``, whose H and runs are not used. H is ``hamiltonian(x, *arguments)``, a
-    function of JAX that returns a number. x has the shape (DIM,), and ``arguments`` are arrays or trees of arrays, such
-    as the weights of a network. ``parameters`` are parameters of π by name; missing ones have their defaults.
+    function written in JAX that returns a number. x has the shape (DIM,), and ``arguments`` are arrays or trees of
+    arrays, such as the weights of a network. ``parameters`` are parameters of π by name; missing parameters have their
+    defaults.
 
-    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns all rows of
-    `Solver.integrate`, (…, rows, DIM). f is written in JAX and has the precision of x0. f can be used with `jit` and
-    `vmap`, on every device of XLA. f has derivatives in forward and in reverse mode, computed from the linearised
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns the rows that
+    `Solver.integrate` stores, (…, rows, DIM). f is written in JAX and has the precision of x0. f can be used with `jit`
+    and `vmap`, on every device of XLA. f has derivatives in forward and in reverse mode, computed from the linearised
     equations of each step.
 
-    Steps are those of ``scheme: gauss`` at this order: Poisson maps, for any H and step size, if the bracket is
-    constant or the bracket of a Lie algebra that phigen knows. ``structure="to truncation"`` accepts every bracket, but
-    its steps are no Poisson maps. If a step fails because h is too large, all later states are NaN. H should be smooth,
-    since the order depends on its derivatives.
+    Steps are those of ``scheme: gauss`` at this order. They are Poisson maps for any H and step size if the bracket is
+    constant, or if it is the bracket of a Lie algebra that phigen knows. ``structure="to truncation"`` accepts every
+    bracket, but its steps are no Poisson maps. If a step fails because h is too large, all later states are NaN. H
+    should be smooth, since the order depends on its derivatives.
 
-    Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not a Poisson tensor.
+    Raises `SpecError` if no Gauss step is known that is a Poisson map for this bracket, and `CheckError` if π is not a
+    Poisson tensor.
     """
     arguments.step_size(h)
     arguments.count(steps, "steps", 0)
@@ -134,7 +136,7 @@ def _real_state(x0: Any, bracket: System) -> Any:
 def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> System:
     """Return the system that a file, a spec or a system object describes.
 
-    Raises `SpecError` if the motion is not determined by π and H(x) alone, for instance with forces.
+    Raises `SpecError` if the motion depends on more than π and H(x), for instance on forces.
     """
     system = load(source) if isinstance(source, str | PathLike) else source
     system = system_from_spec(system) if isinstance(system, Spec) else system
@@ -150,7 +152,7 @@ def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> S
 
 
 def _refused(system: System) -> Iterator[tuple[str, str, str]]:
-    """Yield the key in the spec, a message and a hint for each part of a system that `flow` does not support."""
+    """Yield (key in the spec, message, hint) for each feature of a system that `flow` does not support."""
     if system.time:
         message = "the system depends on the time, but H is a function of x without the time"
         yield "time", message, "remove time, or use phigen.jax.propagator"

@@ -26,7 +26,7 @@ NO_FORWARD_MODE = (
     "use jax.grad, jax.vjp or jax.jacrev"
 )
 
-# An identity map for JAX that raises the error about forward mode if JAX compiles or evaluates it.
+# Identity map for JAX. The error about forward mode is raised when JAX compiles or evaluates this map.
 _refused_forward = Primitive("lattices_have_no_forward_mode")
 _refused_forward.def_abstract_eval(lambda value: value)
 
@@ -52,14 +52,15 @@ def propagator(
 ) -> Callable[..., Any]:
     """Return the run of a solver as a function ``f(x0, parameters={})`` of arrays.
 
-    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns all rows of
-    `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, whose shapes broadcast to (…); missing ones
-    have their defaults. Results have the precision of x0, which is single unless ``jax_enable_x64`` is set. `vmap`
-    integrates its members as one ensemble. If a step fails, its exception is raised where the result is used.
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns the rows that
+    `Solver.integrate` stores, (…, rows, DIM). ``parameters`` are arrays by name, whose shapes broadcast to (…); missing
+    parameters have their defaults. Results have the precision of x0, which is single unless ``jax_enable_x64`` is set.
+    Under `vmap`, all members are integrated as one ensemble. If a step fails, the exception is raised where the result
+    is used.
 
     Derivatives are exact to round-off, and need a solver compiled with ``adjoint=True``. `jax.grad` and `jax.vjp` take
     one reverse pass. `jax.jvp` and `jax.jacfwd` compute the Jacobian, which takes one reverse pass for each number of
-    the result. With ``forward``, all derivatives are computed in this way.
+    the result. With ``forward``, `jax.grad` and `jax.vjp` compute the Jacobian too.
 
     For lattices, DIM stands for (coordinates, *sizes), parameters at sites have the axes of the sites, and further
     arguments, such as ``bonds=``, apply to all runs. Lattices have no derivatives in forward mode.
@@ -145,12 +146,14 @@ def _real(value: Any, argument: str) -> Any:
 def _linear(
     apply: Callable[[Any], Any], transpose: Callable[[Any], Any], arguments: Any, shape: tuple[int, ...]
 ) -> Any:
-    """Return ``apply(arguments)`` for a linear map A, whose transpose JAX shall compute by the function ``transpose``.
+    """Return ``apply(arguments)`` for a linear map A. JAX shall compute the transpose of A by the function
+    ``transpose``.
 
-    ``shape`` is the shape of the result. JAX accepts a given transpose for solutions of linear equations only, so A is
-    written as the trivial solution (u, y) = (v, A v) of an equation.
+    ``shape`` is the shape of the result. JAX accepts such a function only for the solution of a linear equation. So A
+    v, with v = ``arguments``, is computed as the part y of the solution (u, y) = (v, A v) of a trivial equation.
     """
-    # JAX requires a solution that is a linear function of v; adding this zero makes it one.
+    # JAX requires that all parts of the equation depend linearly on the arguments, even a right-hand side that is 0. So
+    # this zero is computed from the arguments, and is added.
     zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(arguments))
     arguments, nothing = jax.tree.map(lambda leaf: leaf + zero, arguments), jnp.broadcast_to(zero, shape)
 
@@ -165,7 +168,7 @@ def _linear(
 
 @jax.custom_jvp  # type: ignore[untyped-decorator]
 def _derived_once(arguments: Any) -> Any:
-    """Identity function that raises an error if it is differentiated, that is, for second derivatives."""
+    """Identity function whose derivative raises an error. Only second derivatives of a run need this derivative."""
     return arguments
 
 
@@ -175,7 +178,7 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Finds the axes that `vmap` adds in front of arguments, from the numbers of axes that the arguments have without
+    """Finds the axes that `vmap` adds in front of the arguments of a run. It stores the numbers of axes without
     `vmap`.
     """
 
@@ -185,7 +188,7 @@ class _Axes:
         self._sites = {name: runs.axes_of(name) for name in parameters}
 
     def aligned(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters, with axes of length 1 inserted where states have additional axes."""
+        """Return the parameters with axes of length 1 inserted, so that their axes match those of the states."""
         aligned = {}
         for name, value in parameters.items():
             array, axes = np.asarray(value), self._axes[name]
