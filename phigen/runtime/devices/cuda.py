@@ -17,7 +17,7 @@ Result = TypeVar("Result")
 #: Compiler options: without fused multiply-adds, results have the same bits as those of C.
 _OPTIONS = ("--fmad=false",)
 
-#: Words in the messages of drivers if an array, or a launch, needs more memory or registers than the card has.
+#: Words in a driver's message if an array or a launch needs more memory or registers than the card has.
 _MEMORY = ("OUT_OF_MEMORY", "OUT_OF_RESOURCES", "MemoryAllocation")
 
 
@@ -63,8 +63,7 @@ class CUDADevice:
         return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
-        """Return the numbers as a kernel argument; CuPy passes it as a struct by value, which lies in constant
-        memory."""
+        """Return the numbers as a struct. CuPy passes a struct to a kernel by value, in constant memory."""
         return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
 
     def write(self, buffer: Any, array: Any) -> None:
@@ -78,7 +77,7 @@ class CUDADevice:
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         group = self._checked_call(
             lambda: kernel.max_threads_per_block
-        )  # not above the launch bound in the source of the kernel
+        )  # at most the launch bound that the source of the kernel declares
         launch_arguments = tuple(
             np.uint64(0) if argument is None else argument for argument in arguments
         )  # 0 is a null pointer

@@ -11,7 +11,7 @@ from phigen.errors import DeviceError
 #: Environment variable that selects a device, by its number or by a part of its name.
 CHOICE = "PHIGEN_DEVICE"
 
-#: Beginning of the message of errors after which a device cannot be used again in this process.
+#: Beginning of error messages about a device that cannot be used again in this process.
 LOST = "the device was lost, or its driver failed"
 
 
@@ -34,7 +34,7 @@ class Device(Protocol):
     group: int  # largest number of work items in a group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
-    is_card: bool  # whether it is a graphics card, where values that do not fit into registers lie in slow memory
+    is_card: bool  # whether the device is a card, where values that do not fit into registers lie in slow memory
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """Return the program compiled from a source text; ``defined`` are preprocessor macros and their values.
@@ -52,12 +52,11 @@ class Device(Protocol):
         ...
 
     def local_bytes(self, kernel: Any) -> int:
-        """Return the bytes of device memory that each work item of a kernel uses for values that registers cannot
-        hold."""
+        """Return the number of bytes of device memory that each work item uses because registers do not suffice."""
         ...
 
     def constants(self, array: Any) -> Any:
-        """Return a kernel argument for an array of numbers that all work items read and that do not change."""
+        """Return a kernel argument for an array of constants that all work items read."""
         ...
 
     def write(self, buffer: Any, array: Any) -> None:
@@ -69,19 +68,22 @@ class Device(Protocol):
         ...
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel for at least ``items`` work items, in groups of the size with which the kernel was compiled."""
+        """Run a kernel for at least ``items`` work items. The size of their groups was fixed when the kernel was
+        compiled.
+        """
         ...
 
 
-#: Open devices, by process number and device index (None for the default). A process that was forked opens its own,
+#: Open devices, by process number and device index (None for the default). A forked process opens devices of its own,
 #: since driver contexts do not survive a fork.
 Opened = dict[tuple[int, int | None], Any]
 
 
 def choose(names: Sequence[str], target: str, index: int | None) -> int:
-    """Return the number of the device to use: ``index`` or, if None, the device that `CHOICE` names, by default 0.
+    """Return the number of the device to use.
 
-    ``names`` are the names of all devices. Raises `DeviceError` if there is no such device.
+    This is ``index``. If ``index`` is None, it is the device that the environment variable `CHOICE` names, or 0 if the
+    variable is not set. ``names`` are the names of all devices. Raises `DeviceError` if there is no such device.
     """
     if index is not None and not hasattr(index, "__index__"):
         raise TypeError(f"device is {index!r}, but must be a number; the devices of {target} are {_listed(names)}")

@@ -9,7 +9,7 @@ import numpy as np
 from phigen.runtime.devices.launching import Launcher
 from phigen.runtime.interface import Floats
 
-#: Numbers by which the kernel ``combine`` receives its operation, by the name of the operation in NumPy.
+#: Name of an operation in NumPy → number that selects this operation in the kernel ``combine``.
 _OPERATIONS = {"add": 0, "subtract": 1, "multiply": 2, "divide": 3, "absolute": 4, "isfinite": 5}
 
 

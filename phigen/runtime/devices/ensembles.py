@@ -20,20 +20,19 @@ from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, stat
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
-#: Fraction of the device memory for a batch of members; the rest is left for other programs and for values that
+#: Fraction of the device memory that a batch of members may use. The rest is for other programs, and for values that
 #: registers cannot hold.
 _SHARE = 0.5
 
-#: Largest number of steps, summed over members, in one launch for each compute unit: about a second. Python handles
-#: Ctrl-C only between launches. No time limit that systems set for kernels is reached.
+#: Largest number of steps for each compute unit in one launch, summed over members. A launch then takes about a second.
+#: Python handles Ctrl-C only between launches, and systems may end kernels that run too long.
 _STEPS_PER_UNIT = 1 << 24
 
-#: Smallest number of members in a launch for each compute unit, so that other members compute while one waits for
-#: memory.
+#: Smallest number of members for each compute unit in one launch. While one member waits for memory, others compute.
 _MEMBERS_PER_UNIT = 2048
 
-#: Largest number of bytes, in addition to registers, that a member can use without leaving the cache of a card. A
-#: multiprocessor has 128 kB of cache, and runs 256 members at once if each uses 255 registers.
+#: Largest number of bytes that a member can use besides registers without leaving the cache of a card. A multiprocessor
+#: runs 256 members at once if each uses 255 registers, and these members share 128 kB of cache.
 _LOCAL_BYTES = 512
 
 
@@ -41,7 +40,8 @@ class DeviceSolver:
     """Solver that integrates ensembles on a device, and leaves all other computations to the solver ``host``.
 
     The object is a `phigen.runtime.backend.Backend`. ``files`` contain the generated header for devices. ``defined``
-    are macros for it: NAME_GROUP is the number of work items in a group, which does not affect results.
+    are macros for the header, such as NAME_GROUP, the number of work items in a group. This number does not affect
+    results.
     """
 
     def __init__(
@@ -80,9 +80,9 @@ class DeviceSolver:
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """Return the final states or frames of an ensemble, as `phigen.runtime.backend.Backend.ensemble`.
 
-        Members are integrated in batches that fit into the memory of the device. ``threads`` has no effect, and
-        ``attitudes`` raises `TypeError`. Raises `DeviceError` if the device fails; its ``trajectory`` contains the
-        results so far, and NaN for members without a result.
+        Members are integrated in batches that fit into the memory of the device. ``threads`` has no effect. Raises
+        `TypeError` if ``attitudes`` is passed, and `DeviceError` if the device fails. The ``trajectory`` of the
+        `DeviceError` contains the results so far, and NaN for members without a result.
         """
         if attitudes is not None:
             raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
@@ -147,8 +147,8 @@ class DeviceSolver:
     ) -> None:
         """Integrate the members of one launch, and store their results in ``final``, ``status`` and ``frames``.
 
-        ``part`` is the slice of these members in the ensemble. ``coefficients`` is a list with the common coefficients
-        of all members as a kernel argument, or is empty.
+        ``part`` is the slice of these members in the ensemble. If all members share their coefficients,
+        ``coefficients`` is a list of one kernel argument; otherwise it is empty.
         """
         device, count, size = self.device, len(members), np.dtype(self._real).itemsize
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
@@ -176,8 +176,8 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the compiled kernels: with ``common`` those for members that share their coefficients, else those for
-        members that each have coefficients of their own.
+        """Return the compiled kernels for members that share one set of coefficients or, without ``common``, have one
+        set each.
         """
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
@@ -186,9 +186,9 @@ class DeviceSolver:
         return self._compiled[common]
 
     def _group(self) -> dict[str, int]:
-        """Return macros for a smaller group of work items; {} if the usual size is possible.
+        """Return macros that make groups of work items smaller; {} if the usual size is possible.
 
-        The groups must be smaller if their predictors need more shared memory than the device has.
+        Groups must be smaller if the predictors of their members need more shared memory than the device has.
         """
         launch = self.interface.ensemble
         if not launch.predictors:
@@ -206,7 +206,7 @@ class DeviceSolver:
             warnings.warn(f"{message}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:
-        """Whether all members can share their coefficients, which are then one argument of the kernel.
+        """Whether all members can share one set of coefficients, which is then an argument of the kernel.
 
         Sharing needs equal parameters, equal step sizes, and equal multiples of the Casimirs that are subtracted from
         H.
@@ -246,7 +246,9 @@ class DeviceSolver:
         return np.stack([np.broadcast_to(v, (count,)) for v in values], axis=-1)
 
     def _shared_or_each(self, values: Floats) -> list[Any]:
-        """Return a buffer of values, and a number: 1 if there is one value for each member, 0 if one holds for all."""
+        """Return a buffer of values, and a flag: 1 if each member has its own value, 0 if all members share one
+        value.
+        """
         return [self._written(np.ascontiguousarray(values, dtype=self._real)), np.int32(len(values) > 1)]
 
     def _written(self, array: NDArray[Any]) -> Any:
@@ -262,7 +264,7 @@ class DeviceSolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """Return a session at x0, which the host computes: the device only integrates ensembles."""
+        """Return a session at x0 on the host, since the device only integrates ensembles."""
         return self._host.start(x0, parameters, t0, first, draws)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
@@ -273,8 +275,7 @@ class DeviceSolver:
         return self._host.has_pullback
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of an ensemble, which the host computes; see
-        `phigen.runtime.backend.Backend.pullback`."""
+        """Return the pullback of an ensemble, computed on the host; see `phigen.runtime.backend.Backend.pullback`."""
         return self._host.pullback(members, bars, threads)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:

@@ -1,4 +1,6 @@
-"""Implicit steps of lattices on devices: a generated NumPy module makes the steps, but its arrays lie on the device."""
+"""Implicit steps of lattices on devices. A generated NumPy module makes the steps, with arrays that lie on the
+device.
+"""
 
 from __future__ import annotations
 
@@ -43,11 +45,11 @@ class ImplicitSession(DeviceLatticeSession):
         self._tell_time()
 
     def evaluated(self, name: str, coefficients: Any, start: Any, x: Any, varied: Any = None) -> DeviceArray:
-        """Evaluate the kernel ``name`` of an implicit stage on the device, for the iterate ``x``, and return its
-        result.
+        """Evaluate the kernel ``name`` of an implicit stage at the iterate ``x``, and return the result, on the
+        device.
 
-        ``coefficients`` are those of the stage, ``start`` is the state before the stage. ``varied`` is a direction, for
-        the kernel that computes a derivative.
+        ``coefficients`` are the coefficients of the stage, and ``start`` is the state before the stage. The kernel that
+        computes a directional derivative also needs the direction, ``varied``.
         """
         if self._written is not coefficients:
             self._write_coefficients([coefficients])
@@ -63,10 +65,10 @@ class ImplicitSession(DeviceLatticeSession):
 
 
 def stepping_module(text: str, name: str, *, single: bool) -> Any:
-    """Return the NumPy module of a lattice, with the functions of its implicit equation replaced by kernels on a
-    device.
+    """Return the NumPy module of a lattice, in which kernels on a device compute the functions of the implicit
+    equation.
 
-    In ``single`` precision, thresholds of the iteration are those of the C in single precision.
+    With ``single``, thresholds of the iteration are those of the C in single precision.
     """
     module: Any = load_module(text, name)
     module._relax = lambda coef, start, x, sites: sites.on_device.evaluated("relax", coef, start, x)

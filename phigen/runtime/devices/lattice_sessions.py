@@ -56,8 +56,9 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host, self._on_device = np.ascontiguousarray(value), False
 
     def _upload(self, compensation: Floats | None = None) -> None:
-        """Copy the state and its compensation terms (0 by default) from the host to the device, unless they are
-        there."""
+        """Copy the state and its compensation terms (0 by default) to the device, unless the device already has this
+        state.
+        """
         if self._on_device:
             return
         state = self._x.ravel()
@@ -134,8 +135,11 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._tell_time()
 
     def _flows(self) -> list[tuple[int, int, int]]:
-        """Return the flows of a step in order: part of H, colour of the sites (for graphs, else 0), row of
-        coefficients."""
+        """Return the flows of a step in order, as triples: part of H, colour of the sites, and row of the
+        coefficients.
+
+        The colour is 0 for lattices that are not graphs.
+        """
         if hasattr(self._module, "BY_COLOUR"):
             return [(part, colour, row) for (part, colour), row in self._sites.schedule]
         return [(part, 0, row) for part, row in self._module.SCHEDULE]
@@ -202,7 +206,9 @@ class DeviceLatticeSession(NumpyLatticeSession):
         return self._fields_of("energy").reshape(self._shape[1:])
 
     def casimirs(self) -> Any:
-        """Return a value for each Casimir: an array of densities (*sizes) for a Casimir of each site, else a number."""
+        """Return a value for each Casimir: an array of densities (*sizes) if each site has its own Casimir, else a
+        number.
+        """
         kinds = self._interface.casimir_kinds
         if "sites" in kinds:
             fields = self._fields_of("casimirs")
@@ -232,8 +238,11 @@ class DeviceLatticeSession(NumpyLatticeSession):
 
 @contextmanager
 def resumable(steps: int) -> Iterator[None]:
-    """Return a context that raises errors of a device as `DeviceError`, with the number of steps and a hint at
-    checkpoints."""
+    """Return a context in which errors of the device are raised as `DeviceError`.
+
+    The message has the number ``steps`` of the steps made so far, and a hint that a run with checkpoints can be
+    resumed.
+    """
     try:
         yield
     except (DeviceError, OutOfMemoryError) as error:

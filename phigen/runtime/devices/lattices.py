@@ -25,8 +25,8 @@ from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 class DeviceLattice(NumpyLattice):
     """Solver of a lattice on a device, with a generated NumPy module for computations on the host.
 
-    The object is a `phigen.runtime.lattice.LatticeBackend`. ``files`` contain the generated header for devices, and
-    ``defined`` are macros for it, such as NAME_GROUP, the number of work items in a group.
+    The object is a `phigen.runtime.lattice.LatticeBackend`. ``files`` contain the generated header for devices.
+    ``defined`` are macros for the header, such as NAME_GROUP, the number of work items in a group.
     """
 
     def __init__(
@@ -62,8 +62,8 @@ class DeviceLattice(NumpyLattice):
 
     @cached_property
     def monitoring(self) -> Any:
-        """The generated NumPy module that computes the durations of flows, if a monitor (rescaled time: dt = g dτ)
-        makes steps equal in τ.
+        """The generated NumPy module that computes the durations of flows, for a lattice with a monitor (rescaled time:
+        dt = g dτ).
         """
         return monitoring_module(self._text, self.interface.name)
 

@@ -12,16 +12,16 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Number of values that a work item adds, or reduces otherwise, in one pass. This number alone decides the order of
-#: sums.
+#: Number of values that a work item adds, or reduces otherwise, in one pass. The order of a sum depends only on this
+#: number and on the number of values.
 _REDUCED = 64
 
 #: Numbers that tell a kernel how to reduce values. A mean is computed as a sum, and divided afterwards.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
-#: Size of a work group in generated code unless the macro NAME_GROUP defines another; with CUDA, the largest size of a
-#: block.
+#: Size of a work group in generated code, unless the macro NAME_GROUP defines another size. With CUDA it is the largest
+#: size of a block.
 _GROUP = 128
 
 
@@ -46,7 +46,7 @@ class Kernels:
 
 
 class Launcher:
-    """Launches kernels for one lattice, with arrays in the precision of its tables of sites."""
+    """Launches the kernels of one lattice. Arrays have the precision of ``tables``, the tables of its sites."""
 
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
@@ -71,8 +71,8 @@ class Launcher:
     def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
         """Compute the sums over bonds or pairs that a kernel reads, then launch the kernel.
 
-        ``coefficients`` is a buffer that the kernel reads from the index ``first`` on, ``colour`` selects sites of a
-        graph, and ``buffers`` are the arrays of the kernel other than the tables of sites.
+        The kernel reads the buffer ``coefficients`` from the index ``first`` on. ``colour`` selects sites of a graph.
+        ``buffers`` are all arrays of the kernel that are not tables of sites.
         """
         for k, sums in enumerate(launch.sums):
             source = (self.parameters, 0) if sums.of_parameters else (coefficients, first)
@@ -97,7 +97,9 @@ class Launcher:
         self.device.launch(self.kernels[launch.kernel], items, [*numbers, *table_arguments])
 
     def _summed(self, launch: SiteLaunch | SumLaunch) -> Any:
-        """Return the buffer for sums over bonds or pairs. All kernels share it; it is made large enough for each."""
+        """Return the buffer for sums over bonds or pairs. All kernels share one buffer, with room for the
+        largest sums.
+        """
         if self._sums is None and "sums" in self._names:
             launches = self.tables.interface.launches
             all_launches = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]

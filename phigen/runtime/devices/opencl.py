@@ -41,7 +41,7 @@ class OpenCLDevice:
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         options = [*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items())]
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pyopencl warns if the compiler writes a log, even of a success
+            warnings.simplefilter("ignore")  # pyopencl warns if the compiler writes a log, even if it succeeds
             try:
                 return self._cl.Program(self._context, text).build(options=options)
             except self._cl.Error as error:

@@ -19,11 +19,11 @@ from phigen.runtime.interface import LatticeInterface
 
 @dataclass
 class SiteTables:
-    """The arrays on a device, called tables, that the kernels of one lattice read besides the state.
+    """Tables of sites: arrays on a device that the kernels of one lattice read, besides the state.
 
-    ``sites`` is the object that describes the sites in the lattice's NumPy module, ``real`` the type of numbers. A
-    table is copied to the device when a kernel first reads it. ``of_sizes`` has the tables that depend on the sizes
-    alone; lattices of equal sizes share them.
+    ``sites`` is the object in the lattice's NumPy module that describes the sites; ``real`` is the type of numbers. A
+    table is copied to the device when a kernel first reads it. ``of_sizes`` has the tables that depend only on the
+    sizes; lattices of equal sizes share these tables.
     """
 
     device: Device
