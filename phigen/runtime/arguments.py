@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface
 from phigen.runtime.members import Members
 
-#: Largest number of steps. The C counts steps in unsigned 64 bits, NumPy's largest integers have 63 bits and a sign.
+#: Largest number of steps: the largest integer of NumPy, which has 64 bits with a sign. The C counts without a sign.
 _MOST = int(np.iinfo(np.int64).max)
 
 #: Largest finite number in single precision, the range of states and parameters in C with ``real: float``.
@@ -27,7 +27,7 @@ LARGEST_SINGLE = float(np.finfo(np.float32).max)
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
-#: Value for "seed, member and step0 are all omitted".
+#: Selection of random numbers if seed, member and step0 are all omitted.
 NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 
 
@@ -100,9 +100,9 @@ def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
 
 
 def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
-    """Return the initial time ``t0``, by default 0, of a trajectory.
+    """Return the initial time ``t0`` of a trajectory; the default is 0.
 
-    If the Hamiltonian does not depend on the time, a parameter may have the name t0; its value is then added to
+    If the Hamiltonian does not depend on the time, a parameter may have the name t0. Its value is then added to
     ``by_keyword``.
     """
     if t0 is None or interface.time:
@@ -114,9 +114,9 @@ def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, flo
 
 
 def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
-    """Return the selection of random numbers that the arguments seed, member and step0 make.
+    """Return the selection of random numbers, from the arguments seed, member and step0.
 
-    Without noise, parameters may have these names; their values are then added to ``by_keyword``.
+    If the system has no noise, parameters may have these names. Their values are then added to ``by_keyword``.
     """
     selected = {name: value for name, value in selections.items() if value is not None}
     if interface.noise:
@@ -211,8 +211,9 @@ def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) ->
 
 
 def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
-    """Return the bound that a value violates: ``positive`` or ``nonnegative``, as the spec declares for the parameter,
-    or ""."""
+    """Return the name of the bound of a parameter that a value violates: ``positive``, ``nonnegative``, or ""
+    for none.
+    """
     least = float(np.min(np.asarray(value), initial=np.inf))
     if name in interface.positive and not least > 0:
         return "positive"
@@ -222,7 +223,8 @@ def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
 def parameters(
     interface: Interface, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values of all parameters. Parameters that are in neither mapping have their default values.
+    """Return the values of all parameters. A parameter that is in neither of the two mappings has its default
+    value.
 
     Raises `TypeError` for unknown names and names passed twice, `ValueError` for values that are not admissible.
     """
@@ -415,14 +417,20 @@ def number(value: float, argument: str) -> float:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as text for a message; Python's ``repr`` refuses integers with thousands of digits."""
+    """Return a value as text for a message.
+
+    Python's ``repr`` refuses integers with thousands of digits. For long integers the text is the number of digits.
+    """
     if isinstance(value, int) and abs(value) > _MOST:
         return f"an integer of {int(math.log10(abs(value))) + 1} digits"
     return shortened(value)
 
 
 def beyond_single(numbers: Mapping[str, Any]) -> str:
-    """Return a message about the first of some named numbers that is too large for single precision; "" if none is."""
+    """Return a message about a number that is too large for single precision; "" if there is none.
+
+    ``numbers`` has numbers and arrays by name. The message is about the first number that is too large.
+    """
     for name, value in numbers.items():
         largest = max(np.ravel(value).tolist(), key=abs, default=0.0)
         if abs(largest) > LARGEST_SINGLE:

@@ -1,4 +1,4 @@
-"""Protocol of back ends. A back end is the loaded solver of one target language; the classes for users call it."""
+"""Protocol of back ends. A back end is the loaded solver of a system in one target language; `Solver` calls it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from phigen.runtime.session import Session
 
 
 class Backend(Protocol):
-    """The loaded solver of a system, in one target language.
+    """Loaded solver of a system, in one target language.
 
     States are float64 arrays whose last axis is the coordinates. ``parameters`` holds the value of every parameter, in
     the order of declaration. The caller has checked all arguments. A failing step raises `BackendError`. If the
-    Hamiltonian depends on the time, ``t0`` is the initial time and ``t`` (rows,) are the times of states; otherwise
-    ``t0`` is 0 and ``t`` None.
+    Hamiltonian depends on the time, ``t0`` is the initial time, and ``t`` (rows,) are the times of the states.
+    Otherwise ``t0`` is 0 and ``t`` is None.
     """
 
     target: str
@@ -55,11 +55,12 @@ class Backend(Protocol):
         ...
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """Return the final states (members, DIM) of an ensemble or, with a stride, its frames (rows, members, DIM).
+        """Return the final states (members, DIM) of an ensemble or, with a stride, its frames (rows, members,
+        DIM).
 
         ``threads`` is the number of threads, None for one per core. ``attitudes`` (rows, members, numbers) contains the
-        initial attitudes in its first row, and receives the attitudes of the frames in the other rows. Without a stride
-        it has two rows, of which the second receives the final attitudes.
+        initial attitudes in its first row, and receives the attitudes of the frames in the other rows. Without a
+        stride, ``attitudes`` has two rows; the second row receives the final attitudes.
         """
         ...
 

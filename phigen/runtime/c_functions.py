@@ -21,7 +21,8 @@ _SIGNATURES = {
 }
 
 
-# Signatures that replace those of the same name if the Hamiltonian depends on the time, which is then an argument.
+# Signatures for a Hamiltonian that depends on the time; they have the time as an additional argument. They replace the
+# signatures above that have the same names.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
@@ -70,7 +71,7 @@ def functions_of(library: Any, interface: Interface) -> Any:
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # an additional argument: initial times, or gauges, of the members
+    if interface.time or "init_gauge" in offered:  # members have initial times or gauges, an additional argument
         _, signature_each = _EXTRAS["ensemble_each"]
         offered |= (
             {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}
@@ -107,8 +108,7 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signatures of those functions that take the time as an additional argument; {} if H is independent of
-    time."""
+    """Return the signatures with the time as an additional argument; {} if H does not depend on the time."""
     time_positions = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
     dated = {name: (offered[name], position) for name, position in time_positions.items() if name in offered}
     return {name: (result, (*a[:position], _DOUBLE, *a[position:])) for name, ((result, a), position) in dated.items()}

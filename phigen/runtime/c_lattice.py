@@ -44,8 +44,8 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Signatures of additional functions. A lattice whose H depends on the time has those of ``_IN_TIME`` or, on a graph,
-#: of ``_GRAPH_IN_TIME``; a lattice with noise has those of ``_NOISY``.
+#: Signatures of additional functions. Lattices whose H depends on the time have ``_IN_TIME`` or, if they are graphs,
+#: ``_GRAPH_IN_TIME``. Lattices with noise have ``_NOISY``.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
@@ -80,25 +80,26 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
 #: Least size of a tape, in numbers: 2 MiB in double precision, the size of a core's cache.
 MIN_TAPE_VALUES = 1 << 18
 
-#: Least number of stored states for which a tape has room; the reverse pass recomputes the steps between them.
+#: Least number of states that a tape can store. The reverse pass recomputes the steps between two stored states.
 MIN_CHECKPOINTS = 8
 
-#: Number of steps by which the tape is measured: the space for one step is the mean over these steps, since several
-#: steps may share one stored state.
+#: Number of steps over which the space on the tape for one step is averaged. Steps differ, since several steps may
+#: share one stored state.
 MEASURED_STEPS = 64
 
 #: Largest size of a tape in bytes (64 MiB), unless `MIN_TAPE_VALUES` or `MIN_CHECKPOINTS` needs more.
 MAX_TAPE_BYTES = 1 << 26
 
-#: Largest number of site updates (sites × steps) in one call of C, between which Python handles Ctrl-C.
+#: Largest number of site updates (sites × steps) in one call of C. Python handles Ctrl-C only between two calls.
 _UPDATES_PER_CALL = 1 << 26
 
 
 class SweepStage(ctypes.Structure):
-    """Data that one sweep of a step (an update of all sites) reads and changes.
+    """Description of one sweep of a step: which coordinates and planes it reads, and which coordinates it
+    changes.
 
-    To update the planes a … b − 1, the sweep reads the planes a − ``behind`` … b − 1 + ``ahead``. ``read`` and
-    ``changed`` are bit masks with a bit for each coordinate.
+    A sweep updates all sites. To update the planes a … b − 1, it reads the planes a − ``behind`` … b − 1 + ``ahead``.
+    ``read`` and ``changed`` are bit masks with a bit for each coordinate.
     """
 
     _fields_: ClassVar = [
@@ -129,8 +130,8 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        # `saved` returns the state before the last flow of a step and, with compensation, the compensation terms of
-        # this state and of the state after the flow.
+        # Largest number of arrays (coordinates, *sizes) that `saved` returns. One is the state before the last flow of
+        # a step. With compensation, two more are the compensation terms of this state and of the present state.
         self._saved_states = 3 if interface.compensated else 1
         self._slow_steps = interface.slow_steps
         self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
@@ -190,10 +191,10 @@ class CLatticeSession:
         return np.asarray(propagated, dtype=np.float64)
 
     def pull_back(self, h: float, steps: int, stride: int, bars: Floats, parameters_bar: int) -> tuple[Floats, Floats]:
-        """Return the states at the rows of a run, and the derivative by the initial state, in reverse mode.
+        """Return the states at the rows of a run, and the cotangent of the initial state.
 
-        The derivative is that of Σ ``bars`` · rows, where row 0 is not included. ``parameters_bar`` is the address of a
-        C struct to which the derivatives by the parameters are added.
+        ``bars`` are the cotangents of the rows; the cotangent of row 0 is ignored. ``parameters_bar`` is the address of
+        a C struct to which the cotangents of the parameters are added.
         """
         row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
@@ -201,10 +202,11 @@ class CLatticeSession:
         state = x0_bar.nbytes
         tape_of_steps = int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - single_step_tape
         tape_per_step = tape_of_steps // MEASURED_STEPS
-        # Size of a tape with room for stored states and for one segment, if each segment of the run is recomputed once.
+        # Size of a tape for a reverse pass that computes each segment of the run twice: the tape has room for stored
+        # states and for one segment.
         recomputing_tape = single_step_tape + 3 * math.isqrt(steps * state * tape_per_step)
-        # The tape of the whole run is preferred in two cases: recomputing steps is slow, or the tape is short because
-        # the inverse flow recomputes states.
+        # A tape of the whole run is preferred in two cases. One is that recomputing steps is slow. The other is that
+        # the tape of a step is smaller than a state, since the inverse flow recomputes states.
         preferred_tape = full_tape if self._slow_steps or tape_per_step < state else recomputing_tape
         min_tape_bytes = max(MIN_TAPE_VALUES * x0_bar.itemsize, single_step_tape + MIN_CHECKPOINTS * 2 * state)
         size = max(min_tape_bytes, min(MAX_TAPE_BYTES, preferred_tape))
@@ -246,8 +248,9 @@ class CLatticeSession:
         return self._filled(self._c.observed_fields, shape) if shape[0] else np.empty(shape)
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays that `resume` needs, in addition to the state, to continue this integration with the same
-        bits."""
+        """Return the arrays with which `resume` continues this integration with the same bits. `resume` also needs the
+        state.
+        """
         if not hasattr(self._c, "saved"):
             return {}
         clock = self._clock()
@@ -257,15 +260,13 @@ class CLatticeSession:
         return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, if a monitor (rescaled time: dt = g dτ) makes steps equal in
-        τ; else {}.
+        """Return the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ); else
+        {}.
         """
         return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ, not
-        in t.
-        """
+        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
         return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
@@ -319,11 +320,11 @@ class CLatticeSession:
     # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Declare that this lattice is a part of a larger lattice with ``planes`` planes, where its first plane is
-        plane ``first``.
+        """Declare that this lattice is a part of a larger lattice, which has ``planes`` planes.
 
-        A plane is the set of all sites with one index of the first axis. With noise, each site then draws the random
-        numbers that it has in the larger lattice.
+        A plane is the set of all sites with one index of the first axis. The first plane of this lattice is plane
+        ``first`` of the larger lattice. With noise, each site then draws the random numbers that it has in the larger
+        lattice.
         """
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
@@ -334,8 +335,8 @@ class CLatticeSession:
     def sweep(self, stage: int, full_range: int, first: int, end: int) -> None:
         """Make one sweep of a step over the planes ``first`` … ``end`` − 1.
 
-        ``stage`` is the number of the sweep in the step; ``full_range`` is 1 for functions valid for all arguments,
-        else 0.
+        ``stage`` is the number of the sweep in the step. ``full_range`` is 1 if functions such as sin must be valid for
+        all arguments, else 0.
         """
         self._expect_done(self._c.sweep(self._address, stage, full_range, first, end))
 
@@ -391,10 +392,10 @@ class CLattice:
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order, followed by one more sweep if there is no noise.
+        """Return the sweeps of a step in order. Without noise, one more sweep follows.
 
-        This additional sweep replaces two: it does the work of the last sweep of a step and of the first sweep of the
-        next step. Raises `ValueError` if the C has no caller-driven stepping.
+        This additional sweep does the work of two: of the last sweep of a step and of the first sweep of the next step.
+        Raises `ValueError` if the C has no caller-driven stepping.
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(
@@ -450,7 +451,7 @@ class CLattice:
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    """Return the C struct of the parameters, and the arrays to which the struct points, by name of the parameter.
+    """Return the C struct of the parameters, and the arrays to which the struct points, by parameter.
 
     The caller must hold a reference to the arrays as long as C uses the struct.
     """

@@ -16,15 +16,15 @@ from phigen.runtime.interface import BackendError, Floats, MissingExtraError, st
 Bytes = NDArray[np.uint8]
 Real = Any  # np.float64, or np.float32 where the C computes in single precision
 
-# Largest number of steps in one call of C, which takes milliseconds for small systems: Python handles Ctrl-C only
-# between two calls.
+# Largest number of steps in one call of C. Python handles Ctrl-C only between two calls. For small systems a call takes
+# milliseconds.
 _STEPS_PER_CALL = 1 << 16
 _ALIGNMENT = 64  # bytes: the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):
-    """Cotangents that a reverse pass updates: those of the state and of the parameters and, with a monitor (rescaled
-    time: dt = g dτ), that of the energy level e.
+    """Cotangents that a reverse pass updates: of the state, of the parameters and, with a monitor (rescaled time: dt =
+    g dτ), of the energy level e.
     """
 
     state: Floats
@@ -83,11 +83,11 @@ class CSession:
         return tangent.astype(np.float64, copy=False)
 
     def pull_back(self, h: float, segment: Segment, tape: Floats, bars: Floats, cotangents: Cotangents) -> Floats:
-        """Compute the rows (rows, DIM) of a segment that begins at the current state, and pull cotangents back to its
+        """Compute the rows (rows, DIM) of a segment that begins at the current state, and the cotangents at its
         start.
 
-        ``cotangents`` are overwritten: on entry they belong to the end of the segment, on return to its start. ``bars``
-        are the cotangents of the rows, ``tape`` is work space.
+        ``cotangents`` are overwritten: before the call they belong to the end of the segment, afterwards to its start.
+        ``bars`` are the cotangents of the rows. ``tape`` is work space.
         """
         rows, level = np.empty_like(bars), (cotangents.level.ctypes.data,) * hasattr(self._c, "level_bar")
         out = (rows.ctypes.data, bars.ctypes.data, cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)

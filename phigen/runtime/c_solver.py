@@ -1,9 +1,11 @@
 """Loaded solver in C: a shared library, called through ctypes.
 
-Besides the documented functions, this module calls ``size_t NAME_solver_size(void)``; ``size_t
-NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``; and with a monitor
-``double NAME_solver_time(const NAME_solver *)``. This module reads only the first member of the solver's struct,
-``x[DIM]`` of double or float; otherwise the struct is copied and stored as bytes.
+Besides the documented functions, this module calls ``size_t NAME_solver_size(void)`` and ``size_t
+NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``. With a monitor it
+also calls ``double NAME_solver_time(const NAME_solver *)``.
+
+The solver's struct is copied and stored as bytes. Of its members, this module reads only the first, ``x[DIM]`` of
+double or float.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ class CSolver:
     """Solver over the shared library of generated C files (name → text): a `phigen.runtime.backend.Backend`.
 
     The object has no state of a trajectory, so several threads may use it. The library is taken from the cache or, if
-    it is not there, compiled. Raises `ToolchainError`.
+    it is not there, compiled. Raises `ToolchainError` if the library cannot be compiled or loaded.
     """
 
     target = "c"
@@ -126,10 +128,10 @@ class CSolver:
         return members.checked(final if frames is None else frames, failures)
 
     def _expect_parameters(self, members: Members) -> None:
-        """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
+        """Raise `BackendError` if no step is possible with the parameters. This is called for an ensemble without
+        members.
 
-        With a monitor g (rescaled time: dt = g dτ) nothing is checked: whether g is positive depends on an initial
-        state.
+        With a monitor (rescaled time: dt = g dτ) nothing is checked, since the sign of g depends on the initial state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -181,8 +183,7 @@ class CSolver:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
     def _with_attitudes(self, members: Members, threads: int | None, attitudes: Floats) -> Floats:
-        """Return the result of `ensemble` for members with attitudes, and write their attitudes into the array
-        ``attitudes``."""
+        """Return the result of `ensemble`, and write the attitudes of the members into the array ``attitudes``."""
         count, row_count = len(members), members.steps // members.stride if members.stride else 0
         frames = members.frames() if members.stride else None
         final, last, status = members.x0.copy(), attitudes[0].copy(), np.zeros(count, dtype=np.uint8)
@@ -231,12 +232,12 @@ class CSolver:
         )
 
     def _packed_arguments(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
-        """Return the arrays of an ensemble for the C: parameters (members, parameters), times or gauges, and steps
-        (members,).
+        """Return arguments of an ensemble for the C: parameters, times or gauges, and step sizes.
 
-        A gauge consists of the multiples of Casimirs that are subtracted from H. The list of times or gauges has one
-        entry: the times if H depends on the time, or else the gauges, None if the C chooses them. Without either, the
-        list is empty.
+        The parameters are an array (members, parameters), the step sizes an array (members,). The second result is a
+        list. If H depends on the time, it contains the initial times (members,). Otherwise, if Casimirs are subtracted
+        from H, it contains the gauges, that is the multiples of Casimirs (members, Casimirs), or None if the C chooses
+        the gauges. In all other cases the list is empty.
         """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))
@@ -289,12 +290,11 @@ class CSolver:
         return rows, x0_bar, parameters_bar
 
     def _can_batch_pullback(self, members: Members) -> bool:
-        """Whether the derivatives of all members can be computed together, by one call of C for each segment of the
-        run.
+        """Whether one call of C for each segment of a run can compute the derivatives of all members.
 
-        This is not possible for several segments if H depends on the time, or if Casimirs are subtracted from H. Then
-        the initial time, or the multiples of the Casimirs, hold for the whole run, but the C would set them again at
-        each segment.
+        For several segments this is not possible if H depends on the time, or if Casimirs are subtracted from H. The
+        initial time, or the multiples of the Casimirs, hold for the whole run, but the C would set them again at each
+        segment.
         """
         if not hasattr(self._c, "pullback_each"):
             return False
@@ -306,9 +306,9 @@ class CSolver:
     def _all_pulled(
         self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """Return states and cotangents for one part of an ensemble, as `pullback` does for the whole.
+        """Return the result of `pullback` for one part of an ensemble.
 
-        Each call of C processes all members of the part over one segment of the run.
+        Each call of C processes all members of this part over one segment of the run.
         """
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
@@ -354,7 +354,7 @@ class CSolver:
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
-        """Return states and cotangents for one member of an ensemble, as `pullback` does for all members.
+        """Return the result of `pullback` for one member of an ensemble.
 
         The segments of the run are processed in reverse order.
         """
@@ -413,8 +413,8 @@ class CSolver:
         return result.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
-        # A C struct cannot be empty. Without parameters, the struct has one unused char. The array that is passed then
-        # has one zero, since it must have at least the size of a char.
+        # A C struct cannot be empty: without parameters it has one unused char. In this case the array has one zero, so
+        # that it is not smaller than the struct.
         return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:
@@ -426,8 +426,7 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return a list with the list of times as its only element, to be unpacked as an argument of ``zip``; [] for
-    None."""
+    """Return a list of arguments for ``zip``: the list of times, or nothing if there are no times."""
     return [] if t is None else [t.tolist()]
 
 

@@ -28,8 +28,8 @@ from phigen.errors import PhigenWarning, ToolchainError
 from phigen.runtime import toolchain
 from phigen.runtime.toolchain import Compiler
 
-#: Size of the cache in bytes beyond which the least recently used entries are removed: about 10,000 solvers of small
-#: systems.
+#: Largest size of the cache in bytes: about 10,000 solvers of small systems. Beyond this size, the least recently used
+#: entries are removed.
 MAXIMUM_SIZE = 512 * 2**20
 
 _SUFFIX = ".so"
@@ -38,8 +38,11 @@ _SCRATCH_LIFETIME = 3600.0  # seconds; compilations take minutes, so an older fo
 
 
 def directory() -> Path:
-    """Return the folder of the cache, which may not exist yet: PHIGEN_CACHE_DIR, or else the user's folder for
-    caches."""
+    """Return the folder of the cache: that in PHIGEN_CACHE_DIR or, by default, a folder among the user's
+    caches.
+
+    The folder may not exist yet.
+    """
     configured = os.environ.get("PHIGEN_CACHE_DIR")
     if configured:
         return Path(configured)
@@ -47,7 +50,7 @@ def directory() -> Path:
         return Path(xdg) / "phigen"
     try:
         home = Path.home()
-    except RuntimeError:  # a container user without a home directory
+    except RuntimeError:  # raised for users without a home directory, as in some containers
         return _private_directory()
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "phigen"
 
@@ -100,7 +103,7 @@ def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool
 
 
 def key_of(library: ctypes.CDLL) -> str:
-    """Return the key, in the cache, of a library that `load` returned: a hash of sources, compiler, flags and
+    """Return the key under which the cache has a library that `load` returned: a hash of sources, compiler, flags and
     machine.
     """
     return Path(library._name).stem.rpartition("-")[0]
@@ -154,9 +157,10 @@ def _key(files: Mapping[str, str], compiler: Compiler) -> str:
 
 @cache
 def _machine() -> str:
-    """Return the properties of the processor on which code compiled with -march=native depends.
+    """Return those properties of the processor on which code compiled with -march=native depends.
 
-    The key of a cache entry contains them, because machines with different processors may share a home folder.
+    The key of a cache entry contains these properties, because machines with different processors may share a home
+    folder.
     """
     relevant_keys = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
     try:
@@ -179,10 +183,10 @@ def _entries(folder: Path) -> Iterator[Path]:
 
 
 def _trim(folder: Path, keep: Path) -> None:
-    """Remove entries until the cache has at most `MAXIMUM_SIZE`, the least recently used first, but never
-    ``keep``.
+    """Remove the least recently used entries until the cache has at most `MAXIMUM_SIZE` bytes.
 
-    Folders that processes left when they died are removed as well. Errors are ignored.
+    The entry ``keep`` is never removed. Folders of compilations whose processes died are removed as well. Errors are
+    ignored.
     """
     sizes: list[tuple[float, int, Path]] = []
     with contextlib.suppress(OSError):

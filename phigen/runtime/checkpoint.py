@@ -15,7 +15,7 @@ from phigen.reading import opened
 from phigen.writing import replacing
 
 _IDENTITY = "identity"
-#: Entries of the identity of a run whose values are hashes, which error messages therefore do not print.
+#: Names of those settings of a run that a checkpoint stores as hashes. Error messages do not print these values.
 HASHES = ("spec", "solver")
 
 
@@ -42,7 +42,7 @@ class Checkpoint:
 
 
 def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
-    """Return the reason why a run may not begin, or resume, with the existing files; "" if it may.
+    """Return the reason why a run may not begin, or resume, because of existing files; "" if it may.
 
     A new run does not overwrite the files of an interrupted run, and a complete run cannot be resumed. ``how`` is the
     option for resuming, which the message names.

@@ -1,11 +1,11 @@
 """Poincaré sections: the zeros of a function g of the state along a trajectory, located by steps of the solver.
 
 The state at a fraction θ of a step of size h, 0 < θ < 1, is computed by one step of size θh from the state before the
-step. The crossing is at the θ for which g vanishes to round-off. So the points have the Casimirs of the trajectory;
-nothing is interpolated.
+step. The crossing is at the θ for which g vanishes to round-off. States are not interpolated, so crossings have the
+Casimirs of the trajectory.
 
 If the method has a collocation polynomial, a zero of g is first located on this polynomial. Newton's method then
-improves θ, by steps of size (θ − 1)h back from the state after the step.
+improves θ: steps of size (θ − 1)h lead back from the state after the step.
 """
 
 from __future__ import annotations
@@ -28,21 +28,22 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Default number of steps in a block: g is evaluated on the array of the states of a whole block, and until then a copy
+#: Default number of steps in a block. After each block, g is evaluated on the array of its states. Until then, a copy
 #: of the session is stored for each step.
 BLOCK = 64
-#: Number of intervals into which a step is divided by values of g on a collocation polynomial: enough to find the
-#: extrema of a motion that makes half a turn in a step.
+#: Number of intervals into which a step with a collocation polynomial is divided. g is evaluated at the ends of the
+#: intervals. Four intervals suffice to find the extrema of a motion that makes half a turn in a step.
 SAMPLES = 4
-#: Half the distance, as a fraction of a step, between the two points of a finite difference of g on a collocation
-#: polynomial: about the cube root of the machine epsilon.
+#: g on a collocation polynomial is differentiated by a central difference, between points at this distance before and
+#: after. The distance is a fraction of a step: about the cube root of the machine epsilon.
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
-#: Numbers of equal smaller steps by which a point inside a step is reached. The first number with which no step fails
-#: is used: a single step without a predictor may not converge.
+#: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps. The first of these numbers with which no step
+#: fails is used: a single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Absolute tolerance for the fraction of a step at which a zero lies: a smaller difference does not change the state.
+#: Absolute tolerance for the position of a zero, as a fraction of a step. A smaller difference does not change the
+#: state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
 #: Direction of a crossing → signs s for which s·g increases through zero as time increases.
@@ -80,18 +81,20 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 
 @dataclass
 class CrossingFinder(Generic[C]):
-    """Locates the zeros of g along a session with steps of size h, in a ``direction`` as time increases.
+    """Locates the zeros of g along a session with steps of size h.
 
-    g is evaluated at the ends of steps and, with a collocation polynomial, at points inside steps. At most one crossing
-    is located between two neighbouring points. If g has the same sign at three points and an extremum between them, the
-    extremum is located, since g may change its sign twice there. A start with g = 0 counts as a crossing if g leaves
-    zero in the requested direction.
+    ``direction`` selects the zeros at which g rises, those at which g falls, or both, as time increases. g is evaluated
+    at points: at the ends of steps and, with a collocation polynomial, inside steps. At most one crossing is located
+    between two neighbouring points. If g has the same sign at three neighbouring points, g may still change its sign
+    twice near an extremum between these points. So the extremum is located too. A start with g = 0 counts as a crossing
+    if g leaves zero in the requested direction.
 
-    ``latest`` is the session after the latest step; ``past`` has copies of the session before that step and before
-    earlier steps. Each step has ``points`` points, at which g has the ``values``; the first value is at the start of
-    step number ``first``. ``t0`` is the time of step 0. If ``timed``, g receives the times as well as the states.
-    ``places`` are the crossings of the latest block of steps: pairs of the number of steps from the start, and a
-    session at the crossing. A ``block`` is the number of steps between two evaluations of g on arrays.
+    ``latest`` is the session after the latest step. ``past`` has copies of the session, made before the latest step and
+    before earlier steps. ``points`` is the number of points in each step. ``values`` are the values of g at the points;
+    the first value belongs to the start of step number ``first``. ``t0`` is the time of step 0. If ``timed``, g
+    receives the times as well as the states. A block has ``block`` steps; after each block, g is evaluated on arrays.
+    ``places`` are the crossings of the latest block. Each is a pair: the number of steps from the start to the
+    crossing, and a session at the crossing.
     """
 
     g: Function
@@ -106,14 +109,16 @@ class CrossingFinder(Generic[C]):
     block: int = BLOCK
     points: int = 1
     latest: C | None = None
-    _sign: float = 1.0  # zeros are searched where sign·g rises; g falls where −g rises
+    _sign: float = 1.0  # 1 in the search for zeros at which g rises, −1 for zeros at which g falls
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]
     ) -> Iterator[tuple[Floats, list[tuple[float, Floats]]]]:
-        """Make ``steps`` steps, each by a call of ``move``; yield the states (rows, DIM) and the crossings in blocks.
+        """Make ``steps`` steps, each by a call of ``move``. Yield the states (rows, DIM) and the crossings of each
+        block of steps.
 
-        Crossings are pairs (t, x). Raises `BackendError` after the block that ends before the failing step.
+        Crossings are pairs (t, x). If a step fails, `BackendError` is raised after the block that ends before this
+        step.
         """
         if not self.values:
             self.first = session.steps
@@ -148,9 +153,8 @@ class CrossingFinder(Generic[C]):
     def _interpolated_states(self, session: C) -> Floats:
         """Return states (points, DIM) inside the last step, from the collocation polynomial of the method.
 
-        The array is empty if the method has no collocation polynomial. It is also empty if the function g needs the
-        times of the states, but steps are equal in the rescaled time τ of a monitor: times inside a step are then
-        unknown.
+        The array is empty if the method has no collocation polynomial. It is also empty if the function g needs times
+        and a monitor rescales the time, since the times inside a step are then unknown.
         """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
@@ -159,9 +163,9 @@ class CrossingFinder(Generic[C]):
         return np.empty((0, 0)) if states is None else states
 
     def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
-        """Return the crossings (t, x) in the first ``part`` (a fraction) of the next step; the session is not advanced.
+        """Return the crossings (t, x) in the first part of the next step; the session is not advanced.
 
-        The result is empty if the next step fails.
+        ``part`` is the length of this part, as a fraction of the step. The result is empty if the next step fails.
         """
         copy, end = session.branch(), session.steps + part * (1 + 1e-12)
         try:
@@ -175,9 +179,10 @@ class CrossingFinder(Generic[C]):
         ]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
-        """Return the time at a fraction of interval j between two points where g is evaluated.
+        """Return the time at a fraction of interval j.
 
-        Interval 0 begins at the point of ``values[0]``.
+        Intervals lie between neighbouring points at which g is evaluated. Interval 0 begins at the point of
+        ``values[0]``.
         """
         return self.t0 + (self.first + (j + fraction) / self.points) * self.h
 
@@ -192,7 +197,7 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings (t, x) in the latest block of steps; the first ``searched`` intervals of the block were
+        """Yield the crossings (t, x) in the latest block of steps, without its first ``searched`` intervals, which were
         searched before.
         """
         self.places = []
@@ -214,10 +219,11 @@ class CrossingFinder(Generic[C]):
                 yield self._crossing_between(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _bracket_at_extremum(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
-        """Return an interval with a zero next to an extremum of g near point i; None if there is no such zero.
+        """Look for an extremum of g near point i. Return the part of an interval in which g has a zero next to the
+        extremum.
 
-        The result is (number of the interval, low, g at low, high, g at high); low and high are fractions of the
-        interval. The list v has the values of g.
+        The result is (j, low, g at low, high, g at high): low and high are fractions of interval j. If there is no
+        zero, the result is None. The list v has the values of g at the points.
         """
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
@@ -226,8 +232,9 @@ class CrossingFinder(Generic[C]):
         curvature = a - 2 * b + c
         offset = (a - c) / (2 * curvature) if curvature else 0.0
         gain = abs((a - c) * offset / 4)
-        # The extremum is examined if b is close to 0. On the parabola through the three values, the extremum differs
-        # from b by ``gain``; a tenth of the curvature allows for the error of the parabola.
+        # The extremum is examined if the value b at point i is close to 0. On the parabola through the values at i − 1,
+        # i and i + 1, the value at the extremum differs from b by ``gain``. A tenth of the curvature allows for the
+        # error of the parabola.
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
@@ -238,11 +245,9 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Return the fraction at which sign·g is smallest in interval j, between two points where g was
-        evaluated.
+        """Return the fraction of interval j at which sign·g is smallest, by a golden-section search.
 
-        The search is a golden-section search. If it meets a fraction at which g and v[j] have different signs, it
-        returns this fraction at once.
+        If the search meets a fraction at which g and v[j] have different signs, it returns this fraction at once.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
@@ -262,8 +267,7 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _value_at(self, j: int, fraction: float) -> float:
-        """Return the value of g at a fraction of interval j, which lies between the points j and j + 1 where g was
-        evaluated.
+        """Return the value of g at a fraction of interval j, which lies between points j and j + 1.
 
         The state is computed from the collocation polynomial or, if the method has none, by a step.
         """
@@ -283,7 +287,8 @@ class CrossingFinder(Generic[C]):
         return self.past[step + 1] if step + 1 < len(self.past) else self.latest
 
     def _session_at_fraction(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
-        """Return a copy of the session before a step, advanced by a fraction of this step.
+        """Return a session at a fraction of a step: a copy of the session before the step, advanced by smaller
+        steps.
 
         ``substeps`` are numbers of equal smaller steps; the first number with which no step fails is used.
         """
@@ -299,11 +304,10 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """Return the crossing between two fractions of interval j, as its number of steps and a session at the
-        crossing.
+        """Return the crossing between two fractions of interval j: its number of steps, and a session there.
 
-        Interval j is that between the points j and j + 1 at which g was evaluated. ``at_low`` and ``at_high`` are the
-        values of g at the fractions ``low`` and ``high``.
+        Interval j lies between points j and j + 1. ``at_low`` and ``at_high`` are the values of g at the fractions
+        ``low`` and ``high``.
         """
         step, part = divmod(j, self.points)
         low, high = (part + low) / self.points, (part + high) / self.points
@@ -316,7 +320,7 @@ class CrossingFinder(Generic[C]):
             return self._sign * self._value(moved_session, self.points * step, self.points * fraction)
 
         for count in SUBSTEPS:
-            # The number of substeps is the same for all fractions, so that g is a smooth function of the fraction.
+            # All fractions are reached by the same number of substeps, so that g is a smooth function of the fraction.
             try:
                 fraction = root(value, low, at_low, high, at_high)
                 crossing_session = self._session_at_fraction(step, fraction, (count,))
@@ -330,8 +334,8 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the zero of the function g in a step, as a fraction of the step and a session at the zero; None if it
-        is not found.
+        """Return the zero of g in a step, as the fraction of the step and a session at the zero; None if none
+        is found.
 
         Newton's method starts from the zero on the collocation polynomial. The iteration may not converge at a double
         zero of g.
@@ -348,7 +352,7 @@ class CrossingFinder(Generic[C]):
             except BackendError:
                 return None
             value = self._sign * self._value(step_end, self.points * step, self.points * fraction)
-            if not abs(value) < best:  # rounding errors have been reached, or Newton's method has failed
+            if not abs(value) < best:  # only rounding errors are left, or Newton's method has failed
                 return zero if best <= abs(slope) * math.sqrt(self._session_after(step).rounding) else None
             best, zero = abs(value), (fraction, step_end)
             following = min(1.0, max(0.0, fraction - value / slope)) if slope else math.nan
@@ -358,17 +362,16 @@ class CrossingFinder(Generic[C]):
         return None
 
     def _clock(self, session: C, counted_time: float) -> float:
-        """Return the physical time of a session if a monitor (rescaled time: dt = g dτ) makes steps equal in τ; else
-        ``counted_time``.
-        """
+        """Return the physical time of a session if a monitor rescales the time by dt = g dτ; else ``counted_time``."""
         elapsed = getattr(session, "time", lambda: math.nan)()
         return counted_time if math.isnan(elapsed) else float(elapsed)
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return the zero of f between two points at which f has different signs, to the resolution of f.
+    """Return the zero of f between ``low`` and ``high``, as accurately as rounding errors of f allow.
 
-    Inverse quadratic interpolation where it is safe, else bisection: T. R. Chandrupatla, Adv. Eng. Software 28 (1997).
+    f has different signs at ``low`` and ``high``. The method is inverse quadratic interpolation where it is safe, else
+    bisection: T. R. Chandrupatla, Adv. Eng. Software 28 (1997).
     """
     a, fa, b, fb = high, at_high, low, at_low
     share = fa / (fa - fb)

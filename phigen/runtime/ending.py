@@ -15,20 +15,19 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Followed
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Function that makes the end of a run: it receives the session after the last whole step, and returns the session at
-#: the end and its number of steps since the start.
+#: Function that makes the end of a run. It receives the session after the last whole step. It returns the session at
+#: the end, and the number of steps from the start to the end.
 Finish = Callable[[Any], tuple[Any, float]]
 
 
-#: A zero within this number of steps after the start does not end a run. Otherwise a run that starts at a zero, where
-#: another run stopped, could stop at once, since rounding may put this zero slightly after the start.
+#: A zero within this number of steps after the start does not end a run. If a run starts at the zero at which an
+#: earlier run stopped, rounding may put this zero slightly after the start.
 START = 1e-9
 
 
 @dataclass(frozen=True)
 class End:
-    """End of a run: after ``steps`` whole steps and, if ``part`` is true, one shorter step; ``finish`` makes
-    that step.
+    """End of a run: ``steps`` whole steps and, if ``part`` is true, one shorter step, which ``finish`` makes.
 
     ``span`` is the time from the start to the end. ``stopped`` is true if a zero of a function ends the run.
     """
@@ -41,7 +40,7 @@ class End:
 
 
 def at_time(session: Followed, h: float, span: float) -> End:
-    """Return the end of a run over the time ``span``, for a session at the start of the run."""
+    """Return the end of a run that takes the time ``span``; the session is at the start of the run."""
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
@@ -55,10 +54,10 @@ def at_time(session: Followed, h: float, span: float) -> End:
 
 
 def after_steps(session: Followed, h: float, steps: int) -> End:
-    """Return the end of a run after a number of whole steps, with the time until then.
+    """Return the end of a run after a number of whole steps.
 
-    The session, which is at the start of the run, is advanced to measure this time. If a step fails, ``span`` of the
-    result is the time before that step.
+    The session, which is at the start of the run, is advanced to measure the time ``span`` of the run. If a step fails,
+    ``span`` is the time before this step.
     """
     with suppress(BackendError):  # the run itself will meet the same error and report it
         session.advance(h, steps)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
-    """Return a trajectory as a Dataset with the variables ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and
-    observables (t).
+    """Return a trajectory as a Dataset with the variables ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t),
+    and the observables (t).
 
     Step size, number of steps and parameters are attributes.
     """

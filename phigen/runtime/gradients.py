@@ -30,9 +30,10 @@ def without_pullback(interface: Interface) -> TypeError:
 
 
 class Pullback(NamedTuple):
-    """Result of `Solver.pullback`: states, and derivatives by the initial state and by the parameters (by name).
+    """Result of `Solver.pullback`: states, and derivatives by the initial state and by the parameters (by
+    name).
 
-    The derivatives are those of the scalar product of the states with a cotangent.
+    The function whose derivatives are computed is the scalar product of the states with a cotangent.
     """
 
     x1: Floats
@@ -53,8 +54,8 @@ class Jacobian(NamedTuple):
 class Segment:
     """Part of a run that is differentiated at once: ``count`` steps, which begin after step number ``first``.
 
-    ``rows`` are the numbers of those rows of the trajectory that lie in this part: one after every ``stride`` of its
-    steps, and one at its end. ``rows`` is empty if the segment ends between two rows.
+    ``rows`` are the numbers of the rows of the trajectory in this part. Rows are after every ``stride`` steps and at
+    the end of the part. A part that ends between two rows of the trajectory has no rows.
     """
 
     first: int
@@ -78,7 +79,7 @@ def segments(steps: int, stride: int, limit: int) -> list[Segment]:
             if last - first <= limit:
                 yield Segment(first, last - first, stride, rows)
                 continue
-            for begin in range(first, last, limit):  # one stride is longer than the limit, so it is divided
+            for begin in range(first, last, limit):  # one stride exceeds the limit, and is divided
                 count = min(limit, last - begin)
                 yield Segment(begin, count, count, rows if begin + count == last else range(0))
 

@@ -53,7 +53,7 @@ class Interface:
     nonnegative: frozenset[str] = frozenset()  # the parameters that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
-    moving: frozenset[str] = frozenset()  # quantities (``energy``, Casimirs) that explicit time or forces make variable
+    moving: frozenset[str] = frozenset()  # quantities (``energy``, Casimirs) that vary due to explicit time or forces
     monitored: bool = False  # whether a monitor rescales time by dt = g dτ: steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
     position: bool = False  # whether the spec reconstructs a position too
@@ -99,7 +99,7 @@ class LatticeInterface(Interface):
     pairs: bool = False  # whether every pair of sites interacts
     compensated: bool = False  # whether the C stores a compensation term for each value of the state
     at_bonds: tuple[str, ...] = ()
-    masses: str = ""  # parameter that holds masses of bodies in relative coordinates; its first value must be positive
+    masses: str = ""  # parameter with the masses of bodies in relative coordinates; its first value must be positive
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
     colours: int = 1
     # weights w of the axes: the site (i, j, …) has the colour (w₁ i + w₂ j + …) modulo the number of colours
@@ -108,9 +108,7 @@ class LatticeInterface(Interface):
     slow_steps: bool = False  # whether a step takes longer to recompute than to write to a tape and read back
 
     def is_shared(self, sites: int) -> bool:
-        """Whether several threads share a lattice of ``sites`` sites; smaller lattices use one thread, as in the C
-        runtime.
-        """
+        """Whether the C uses several threads for a lattice of ``sites`` sites, rather than one thread."""
         return sites > (512 if self.pairs else 4096)
 
 
@@ -137,9 +135,10 @@ class Clock:
 
 
 class BackendError(Exception):
-    """A step failed in the generated code; `phigen.runtime.solver` converts this error to the user's `StepError`.
+    """A step failed in the generated code; `phigen.runtime.solver` converts this error to the user's
+    `StepError`.
 
-    ``states`` are the rows up to the failure, of which the last is the state before the failing step. For an ensemble,
+    ``states`` are the rows up to the failure; the last row is the state before the failing step. For an ensemble,
     ``states`` are the last states of all members. ``step`` is the number of successful steps, −1 if unknown.
     ``failures`` maps the number of each failed member to the name of its status.
     """
@@ -158,8 +157,7 @@ class BackendError(Exception):
 
 
 class MissingExtraError(Exception):
-    """The generated code lacks the requested function, since an option such as ``tangent`` or ``adjoint`` was not
-    set."""
+    """The generated code lacks a function, since an option such as ``tangent`` or ``adjoint`` was not set."""
 
 
 def row_steps(steps: int, stride: int) -> NDArray[np.int64]:

@@ -14,11 +14,11 @@ _QUESTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 @contextmanager
 def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
-    """Return a context in which Ctrl-C ends a call of C early, and raises `KeyboardInterrupt` at the end of the
-    context.
+    """Return a context in which Ctrl-C ends a call of C early. At the end of the context, `KeyboardInterrupt` is
+    raised.
 
-    The function ``ask`` receives the address of a C function that returns nonzero after Ctrl-C; the C shall call this
-    function. At the end of the context ``ask`` receives None.
+    At the beginning, ``ask`` is called with the address of a C function that returns nonzero after Ctrl-C. The C must
+    call this function from time to time. At the end, ``ask`` is called with None.
 
     Only the main thread receives signals. In other threads, or if the program has its own signal handler, ``ask`` is
     not called, and Ctrl-C acts as usual.

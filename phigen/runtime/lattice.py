@@ -66,8 +66,8 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
     from phigen.symbolic.expression import Expression
 
-#: If a value of the state exceeds this limit, the message about a failed step mentions that vectorised sin and cos of
-#: the C only accept angles up to 10⁸.
+#: Vectorised sin and cos of the C accept only angles up to 10⁸. If a value of the state exceeds this smaller limit, the
+#: message about a failed step mentions angles.
 _LARGE_ANGLE = 5e7
 
 
@@ -85,9 +85,7 @@ class LatticeSession(Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ, not
-        in t.
-        """
+        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
         ...
 
     def hold(self, level: float) -> None:
@@ -109,8 +107,9 @@ class LatticeSession(Protocol):
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays that `resume` needs, in addition to the state, to continue this integration with the same
-        bits."""
+        """Return the arrays with which `resume` continues this integration with the same bits. `resume` also needs the
+        state.
+        """
         ...
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -203,14 +202,15 @@ class LatticeBackend(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LatticeTrajectory:
-    """States of a lattice along one integration, called frames. The first is the initial state, the last the final
-    state.
+    """States of a lattice along one integration, called frames. The first frame is the initial state, the last frame
+    the final state.
 
     ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, as a memory map if they were written
-    to a file, and ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
-    size ``h``, or at given times, and one for the end, which may be inside a step. ``observed`` (frames, observables)
-    are the observables that are one number each. ``crossings`` are the states at which the section of a run is crossed.
-    ``retried`` are the numbers of those steps that failed and were repeated as several smaller steps.
+    to a file, and ``energy`` (frames,) the values of H. There is a frame after every stride-th of the ``steps`` steps
+    of size ``h``, or at each given time. The last frame is at the end, which may be inside a step. ``observed``
+    (frames, observables) are the observables that are one number each. ``crossings`` has the states at which the
+    trajectory crosses the section of the run. ``retried`` are the numbers of those steps that failed and were repeated
+    as several smaller steps.
 
     With a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau``
     is None without a monitor. If the run continues another run, ``joined`` is true and ``tau`` None.
@@ -248,8 +248,7 @@ class LatticeTrajectory:
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """Return a figure of the state: of a chain, over space and time; of other lattices, on planes of the lattice at
-        some times.
+        """Return a figure of the states: for a chain over space and time, for other lattices at some times.
 
         Panels below show the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it.
         Raises `MissingPackageError` without matplotlib.
@@ -327,8 +326,8 @@ class LatticeTrajectory:
         return {name: np.array([row[name] for row in rows]) for name in first}
 
     def transforms(self) -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return the spectrum and the correlation that the run requested, as dimension names and values by variable
-        name.
+        """Return the spectrum and the correlation that the run requested as a dict: name → (names of dimensions,
+        values).
 
         The names are ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and ``correlation``. A result that the run
         did not request is missing.
@@ -402,15 +401,14 @@ class LatticeTrajectory:
 
 
 class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
-    """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates,
-    *sizes).
+    """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
-    Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), at
-    bonds an array (bonds,), or one number for all sites or bonds. Parameters that are not passed have the defaults of
-    the spec, evaluated at the sizes of the state; `SpecError` is raised if such a default is a list or a file with
-    another number of values. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of sites from
-    0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several threads may use
-    a solver.
+    Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), a
+    parameter at bonds an array (bonds,); one number holds for all sites or bonds. Parameters that are not passed have
+    the defaults of the spec, evaluated at the sizes of the state. `SpecError` is raised if a default is a list or a
+    file with another number of values. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of
+    sites from 0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several
+    threads may use a solver.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -453,8 +451,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         Frames are the states after every ``stride``-th step and after the last. With ``until`` in place of ``steps``,
         the last step is shortened to end at that time. A step that fails is repeated as 2, 4, …, up to 2**retry smaller
-        steps; together they are another map than one whole step, but also a Poisson map. With a monitor (rescaled time:
-        dt = g dτ), ``h`` is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
+        steps. Together, these are a Poisson map, but not the map of one whole step. With a monitor (rescaled time: dt =
+        g dτ), ``h`` is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
 
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
         numbers of a site are a function of ``seed``, ``member``, the site, and the number of the step, where ``step0``
@@ -464,8 +462,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         With ``checkpoints``, a path, the state is saved there at every frame; a call with the same arguments resumes
         from that state. The file is removed at the end of the run. ``resume=False`` starts a new run, and refuses to
         overwrite the files of an interrupted one. ``progress`` is called after each frame with the number of steps
-        done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step, and `ValueError` if
-        the files belong to an interrupted run, or to a complete one that cannot be resumed.
+        done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step. Raises `ValueError`
+        if the files belong to an interrupted run, or to a complete run, which cannot be resumed.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -594,13 +592,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
         A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
-        parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
-        ``sizes`` or at those passed. Further arguments replace settings of the spec: the ``step``, the number of
-        ``steps`` or the time ``until`` where the run ends, the ``stride`` or the time ``every`` between rows, or the
-        times ``at`` which rows are stored, and the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the initial
-        state; ``retry`` is explained at `integrate`. A run with ``stop`` ends where that expression first passes
-        through 0. ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if there is no run
-        of that name, and `SpecError` for an initial state that does not fit the sizes.
+        parameters at sites and bonds are computed from the formulas, files and random numbers of the run, for its
+        ``sizes`` or for the argument ``sizes``. Further arguments replace settings of the spec: the ``step``; the
+        number of ``steps``, or the time ``until`` at which the run ends; the ``stride``, the time ``every`` between
+        rows, or the times ``at`` of the rows; and the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the
+        initial state; ``retry`` is explained at `integrate`. A run with ``stop`` ends where the expression ``stop``
+        first passes through 0. ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if
+        there is no run of that name, and `SpecError` for an initial state that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
@@ -638,10 +636,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         )
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
-        """Return an expression in observables, parameters and time as a function of arrays (rows, observables), and of
-        times.
+        """Return an expression as a function of observables (rows, observables) and, if the spec has a time, of times
+        (rows,).
 
-        ``values`` are the parameters. The times are an argument only if the spec has a time.
+        The expression may also contain parameters; ``values`` are their values.
         """
         return function_of(expression, self.interface.observables, values, self.interface.time)
 
@@ -873,7 +871,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, values, times, draws)
 
     def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
-        """Return the initial time as a number, or as an array (members,) if ``t0`` is one; the default is 0.
+        """Return the initial time, by default 0: a number, or an array (members,) if ``t0`` is an array.
 
         If H does not depend on the time, ``t0`` can only be the name of a parameter, whose value is added to
         ``by_keyword``.
@@ -1069,10 +1067,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return values | bonds
 
     def defaults(self, passed_values: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
-        """Return the default values of those parameters that are not in ``passed_values`` and whose defaults need the
-        sizes.
+        """Return the default values that depend on the sizes, of parameters missing in ``passed_values``.
 
-        These defaults are formulas, lists, files or random numbers. Raises `SpecError` if one does not fit the sizes.
+        These defaults are formulas, lists, files or random numbers. Raises `SpecError` if a default does not fit the
+        sizes.
         """
         missing_names = self.interface.required - set(passed_values)
         if not missing_names:
@@ -1096,7 +1094,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         t0: float | None,
         noise_arguments: Mapping[str, int | None] = arguments.NONE_DRAWN,
     ) -> Beginning:
-        """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
+        """Return the checked arguments of a trajectory. The step size is NaN if ``h`` is None."""
         begin = arguments.start_time(t0, self.interface, by_keyword)
         draws = arguments.draws(self.interface, by_keyword, noise_arguments)
         level = arguments.level(self.interface, by_keyword)

@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
-#: Number of steps for which copies of an integration share one saved state: saving costs as much as some twenty steps
-#: of 64 sites.
+#: Number of steps for which copies of an integration share one saved state. Saving a state of 64 sites takes as long as
+#: some twenty steps.
 SHARED_STEPS = 16
 
 
 class LatticeCourse:
     """A lattice being integrated (`phigen.runtime.session.Followed`), with the state (coordinates, *sizes).
 
-    The steps of a copy made by `branch`, and of an integration restored from `saved`, have the same bits as those of an
-    uninterrupted integration. A copy starts its session on first use, since sections make a copy at every step but use
-    few of them. Copies share a saved state for up to `SHARED_STEPS` steps; a copy that is used repeats the steps since
-    that state.
+    A copy made by `branch`, or an integration restored from `saved`, continues with the same bits as an uninterrupted
+    integration. Sections make a copy at every step, but use only a few copies. So a copy starts its session on first
+    use, from a saved state that copies share for up to `SHARED_STEPS` steps. At its start, the session repeats the
+    steps since the saved state.
     """
 
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
@@ -45,7 +45,7 @@ class LatticeCourse:
 
     @property
     def sites(self) -> LatticeSession:
-        """The session that makes the steps. If the integration has none yet, it is started from the saved arrays."""
+        """The session that makes the steps. If there is no session yet, one is started from the saved arrays."""
         if self._sites is None:
             # The session begins at the last change of the step size, from which times and random numbers are counted.
             arrays, clock, steps_before = self._arrays, self._clock, self._before
@@ -77,9 +77,7 @@ class LatticeCourse:
         return self.sites.state()
 
     def time(self) -> float:
-        """The physical time since the start if a monitor (rescaled time: dt = g dτ) makes steps equal in τ;
-        else NaN.
-        """
+        """The physical time since the start for a lattice with a monitor (rescaled time: dt = g dτ); else NaN."""
         return self.sites.time() if self.solver.interface.monitored else math.nan
 
     def element(self) -> Floats:
@@ -88,15 +86,15 @@ class LatticeCourse:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
-        sites = self.sites  # starts the session if there is none, which repeats steps of the previous size
+        sites = self.sites  # started before h changes, since its start may repeat earlier steps
         if h != self._clock.h:
             self._anchor = {}
             self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
-        """Return an independent copy; until its first use, the copy consists of saved arrays that it shares with other
-        copies.
+        """Return an independent copy. Until its first use, the copy consists of saved arrays, which several copies
+        share.
         """
         steps = self.steps
         if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
@@ -166,8 +164,8 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """An integration whose `state` is the array of the observables of the spec (observables,), for sections and
-    stops.
+    """An integration whose `state` is the array (observables,) of the observables of the spec, as sections and stops
+    need it.
 
     A failing step is repeated as several smaller steps, see `Retrying`.
     """

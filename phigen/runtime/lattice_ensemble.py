@@ -96,10 +96,11 @@ def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
 
 
 def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], argument: str = "X0") -> Floats:
-    """Return the initial states (members, coordinates, *sizes) from ``X0``. Raises `ValueError` for other shapes.
+    """Return the initial states (members, coordinates, *sizes) from ``X0``. Raises `ValueError` for other
+    shapes.
 
-    ``per_member`` maps names of other arguments to their values, which have an axis of members. If there are any,
-    ``X0`` may be one state, with which all members start.
+    ``per_member`` has, by name, the values of those other arguments that have an axis of members. If ``per_member`` is
+    not empty, ``X0`` may be one state, with which all members start.
     """
     axes = 1 + len(solver.interface.axes)
     member_states: Iterable[Floats]

@@ -26,15 +26,18 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_rows import Past
 
-#: Suffixes of files to which frames are written one by one, and of files that are written at the end of a run.
+#: Suffixes of files to which a run writes frames one by one (STREAMS), and of files that are written at its end
+#: (WHOLE).
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
-#: Largest number of columns of a table of states, since programs for tables show some hundreds of columns.
+#: Largest number of columns of a table of states. Programs for tables only show some hundreds of columns.
 MAX_COLUMNS = 1000
 
 
 class FrameRows:
-    """Sink that collects the rows of a run of a lattice: each row has a state, its energy and its observables."""
+    """Rows of a run of a lattice, each with a state, its energy and its observables: a
+    `phigen.runtime.lattice_run.Sink`.
+    """
 
     def __init__(self, frames: Frames | GrowingFrames, seconds: float = 0.0) -> None:
         self.frames, self.seconds = frames, seconds
@@ -92,9 +95,9 @@ class GrowingFrames:
         return self._states[k]
 
     def put(self, k: int, state: Floats) -> None:
-        """Store the state of frame k, where k is the number of frames so far.
+        """Store the state of frame k. The number k must be the number of frames stored so far.
 
-        Raises `LimitError` if memory does not suffice for twice the number of frames.
+        Raises `LimitError` if memory does not suffice for twice as many frames.
         """
         if k & (k - 1) == 0:
             expect_room(f"{2 * max(k, 1)} states at crossings", 2 * max(k, 1) * state.nbytes)
@@ -115,7 +118,7 @@ class GrowingFrames:
 def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
     """Return all settings that determine an integration, as plain data that a checkpoint stores.
 
-    ``rows`` are numbers that identify the rows of the integration.
+    ``rows`` are the numbers by which `RowSteps.described` identifies the rows of the integration.
     """
     arrays = {name: np.asarray(value) for name, value in beginning.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in beginning.values.items() if not np.ndim(value)}

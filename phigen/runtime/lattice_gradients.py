@@ -1,5 +1,5 @@
-"""Derivatives of runs of lattices, in reverse mode: of one run, or of an ensemble whose members may differ in
-parameters.
+"""Derivatives of runs of lattices in reverse mode: for one run, or for an ensemble with parameters that differ by
+member.
 """
 
 from __future__ import annotations

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Positions of the rows of a run. Row k is reached by ``whole[k]`` steps and a shorter step of size ``part[k]``.
+    """Positions of the rows of a run. Row k is reached by ``whole[k]`` steps and a step of size ``part[k]``.
 
-    ``part`` is 0 for rows at whole steps. The first row is the start. If there is an ``end``, it makes the last row.
-    With a monitor (rescaled time: dt = g dτ) and rows at given times, only the times ``spans`` (rows,) after the start
-    are known beforehand; the number of steps before each row is counted during the run.
+    ``part[k]`` is 0 if row k is at the end of a whole step. The first row is the start, and the last row is the ``end``
+    if there is one. With a monitor (rescaled time: dt = g dτ) and rows at given times, ``spans`` (rows,) are the times
+    from the start to the rows; the number of steps before each row is then counted during the run.
     """
 
     whole: NDArray[np.int64]
@@ -46,7 +46,9 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Return a few numbers that identify these rows; a run resumes only if they equal those in its checkpoint."""
+        """Return a few numbers that identify these rows. A run resumes from a checkpoint only if it has the same
+        numbers.
+        """
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]
         return [*rows, *spans, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
@@ -80,8 +82,8 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
 
 
 def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
-    """Return rows at the times ``spans`` after the start, and at the end, if a monitor makes steps equal in τ, not in
-    t.
+    """Return rows at the times ``spans`` after the start and at the end, if a monitor rescales the time by dt =
+    g dτ.
     """
     inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
     step_numbers = np.zeros(len(inner) + 2, dtype=np.int64)
@@ -121,12 +123,12 @@ class Past:
 
 @dataclass(frozen=True)
 class IntegrationPlan:
-    """An integration before it begins: initial values ``at``, the ``rows`` to store, and further settings.
+    """Plan of an integration: the initial values ``at``, the ``rows`` to store, and further settings.
 
-    ``begin`` is the initial time, also for an H that does not depend on the time. A failing step is halved at most
-    ``retry`` times. ``section`` is the section whose crossings are recorded. ``transforms`` are the spectra and
-    correlations to compute from the frames, ``past`` is the finished run that this one continues, and ``origin`` is the
-    provenance text for output files.
+    ``begin`` is the initial time, even if H does not depend on the time. A failing step is halved at most ``retry``
+    times. Crossings of the ``section`` are recorded. ``transforms`` are the spectra and correlations to compute from
+    the frames. ``past`` is the finished run that this integration continues. ``origin`` is the provenance text for
+    output files.
     """
 
     at: Beginning

@@ -24,7 +24,8 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
-#: Crossings are searched in blocks of steps. This is the largest number of values in all states of a block (32 MB).
+#: Crossings are searched in blocks of steps, whose states are in memory. The states of a block have at most this number
+#: of values, which take 32 MB.
 MOST_FOLLOWED = 1 << 22
 
 
@@ -98,16 +99,16 @@ class LatticeRun:
 
     @property
     def tau(self) -> Floats | None:
-        """The values of τ of the complete rows, if a monitor rescales time by dt = g dτ; else None.
+        """The values of τ at the complete rows, if a monitor rescales time by dt = g dτ.
 
-        Also None if this run continues another run.
+        None without a monitor, and for a run that continues another run.
         """
         if not self.solver.interface.monitored or self.plan.past is not None:
             return None
         return self.plan.at.h * np.array(self.numbers)
 
     def _store_mark(self, course: ObservedCourse, number: float) -> None:
-        """Store the time of a row and its number of steps, which has a fraction if the row lies inside a step."""
+        """Store the time of a row, and the number of steps before the row. Inside a step, the number has a fraction."""
         self.clocks.append(course.time())
         self.numbers.append(number)
 
@@ -142,8 +143,8 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """Return the object that finds crossings of the section. If ``arrays`` come from a checkpoint, the object
-        continues from them.
+        """Return the object that finds crossings of the section. It continues from ``arrays`` of a checkpoint, if there
+        are any.
         """
         plan, section = self.plan, self.plan.section
         assert section
@@ -175,10 +176,10 @@ class LatticeRun:
             self.crossings.see(crossing_session.sites)
 
     def _reached(self, k: int) -> tuple[ObservedCourse, float]:
-        """Return a lattice session at row k, and its number of steps. The whole steps before the row must have been
-        made.
+        """Return a session at row k, and the number of steps before row k.
 
-        If the row lies inside a step, a copy of the session makes the shorter step to it.
+        All whole steps before the row must have been made. If the row lies inside a step, a copy of the run's session
+        makes the shorter step to the row.
         """
         rows, part, h = self.plan.rows, float(self.plan.rows.part[k]), self.plan.at.h
         course: ObservedCourse = self.course

@@ -1,4 +1,4 @@
-"""Runs of lattices that record numbers instead of frames: energy, Casimirs that are sums or products, observables."""
+"""Runs of lattices that record numbers instead of states: the energy, Casimirs (sums or products), and observables."""
 
 from __future__ import annotations
 
@@ -91,9 +91,7 @@ def recordable(interface: LatticeInterface) -> tuple[str, ...]:
 
 
 def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
-    """Return the energy and the observables of a trajectory as a `LatticeSeries`. Of the states, only the first and the
-    last are taken over.
-    """
+    """Return the energy and the observables of a trajectory as a `LatticeSeries`, with its first and its last state."""
     x, solver = trajectory.x, trajectory.solver
     columns = {"energy": trajectory.energy}
     columns |= {name: trajectory.observed[:, k] for k, name in enumerate(solver.interface.observables)}
@@ -102,7 +100,7 @@ def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
 
 
 class NumberRows:
-    """Rows of a run with the quantities called ``names``, but no states: a `phigen.runtime.lattice_run.Sink`."""
+    """Rows of a run with quantities that ``names`` lists, but without states: a `phigen.runtime.lattice_run.Sink`."""
 
     def __init__(self, interface: LatticeInterface, names: Sequence[str]) -> None:
         self.about, self.names, self.seconds = interface, names, CHECKPOINT_SECONDS
@@ -131,7 +129,7 @@ class NumberRows:
 
 
 def _recorded_columns(session: LatticeSession, interface: LatticeInterface, names: Sequence[str]) -> list[float]:
-    """Return the quantities called ``names`` at the state of a session, in this order; no others are computed."""
+    """Return the quantities that ``names`` lists, in this order, at the state of a session."""
     from phigen.runtime.lattice import reduced
 
     values = {"energy": session.hamiltonian()} if "energy" in names else {}

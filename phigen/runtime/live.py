@@ -80,8 +80,8 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Store new parameters and the clock ``begin``. Without a monitor (rescaled time: dt = g dτ), time is counted
-        by this clock from now on.
+        """Store new parameters. Without a monitor (rescaled time: dt = g dτ), also store the clock ``begin``, which
+        counts the time from now on.
         """
         self.parameters = values
         if not self.solver.interface.monitored:

@@ -15,8 +15,8 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: A piece ends after about _SECONDS, so that the user sees progress, or when it has _MOST_STEPS steps or _MOST_ROWS
-#: rows.
+#: A piece ends after about _SECONDS, so that the user sees progress. It ends earlier if it has _MOST_STEPS steps or
+#: _MOST_ROWS rows.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 
@@ -25,10 +25,10 @@ _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 class Piece:
     """A piece of an integration: its rows, and the crossings of a section that occurred in it.
 
-    ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step; ``x``
-    (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). With a monitor (rescaled time: dt
-    = g dτ), ``passed`` (rows,) is the physical time since the start, else NaN. ``turned`` (rows, numbers) are attitudes
-    and positions.
+    ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step. ``x``
+    (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). ``passed`` (rows,) is the physical
+    time since the start if there is a monitor (rescaled time: dt = g dτ), and NaN otherwise. ``turned`` (rows, numbers)
+    are attitudes and positions.
     """
 
     numbers: Floats
@@ -38,7 +38,7 @@ class Piece:
     turned: Floats
 
 
-#: Data of a row besides its state: with a monitor the physical time since the start (else NaN), and the numbers of its
+#: Data of a row besides its state: the physical time since the start (NaN without a monitor), and the numbers of its
 #: attitude and position.
 Mark = tuple[float, Floats]
 
@@ -54,12 +54,13 @@ def march(
     is_started: bool = False,
     goes_on: bool = False,
 ) -> Iterator[Piece]:
-    """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
+    """Advance a session until it has made ``steps`` steps of size h. Yield every ``stride``-th state and the last, in
+    pieces.
 
-    If ``goes_on``, a shorter step follows, so the state after the last whole step is not yielded as the last state. The
-    length of a piece depends on the speed of the machine; the rows do not. ``see_tangent`` receives the derivative
-    (DIM, DIM) of each step. ``is_started`` is true if the initial state was yielded before. If a step fails,
-    `BackendError` is raised after a piece that ends with the state before that step.
+    The length of a piece depends on the speed of the machine; the rows do not. ``is_started`` is true if the initial
+    state was yielded before. ``goes_on`` is true if a shorter step will follow; the state after the last whole step is
+    then not yielded as the last state. ``see_tangent`` receives the derivative (DIM, DIM) of each step. If a step
+    fails, `BackendError` is raised after a piece that ends with the state before that step.
     """
     size = 1
     if not is_started:
@@ -91,9 +92,7 @@ def march(
 
 
 def standing(session: Session, number: float) -> Piece:
-    """Return a piece with one row, the present state of a session; ``number`` is the number of steps since the
-    start.
-    """
+    """Return a piece with one row: the present state of a session, ``number`` steps after the start."""
     return _piece_of_rows([(session, number)], len(session.state()), len(session.element()))
 
 
@@ -114,12 +113,12 @@ def march_at(
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
 ) -> Iterator[Piece]:
-    """Advance a session to ``steps`` steps, and yield the states at the times ``spans`` after the start, in
+    """Advance a session until it has made ``steps`` steps. Yield the states at the times ``spans`` after the start, in
     pieces.
 
-    The session makes whole steps; a copy of it makes the shorter step to a state inside a step. ``see_tangent``
-    receives the derivatives of the whole steps. Steps after the last time yield pieces without rows. If a step fails,
-    `BackendError` is raised after the piece with the states before that step.
+    The session makes whole steps. To reach a state inside a step, a copy of the session makes a shorter step.
+    ``see_tangent`` receives the derivatives of the whole steps. Steps after the last time yield pieces without rows. If
+    a step fails, `BackendError` is raised after the piece with the states before that step.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []
@@ -165,9 +164,10 @@ def march_at(
 def _session_at_time(
     session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
 ) -> tuple[Session, float]:
-    """Return a session at the time ``span`` after the start, and its number of steps, with a fraction inside a step.
+    """Return a session at the time ``span`` after the start, and its number of steps. Inside a step, the number has a
+    fraction.
 
-    The argument ``session`` is advanced by ``advance`` over the whole steps before that time.
+    ``advance`` makes the whole steps before that time, with the argument ``session``.
     """
     clock = session.time()
     elapsed = session.steps * h if np.isnan(clock) else clock
@@ -188,11 +188,12 @@ def _states(
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
-    """Advance a session to ``target`` steps. Yield, for each block of steps, first step number, states, marks and
-    crossings.
+    """Advance a session until it has made ``target`` steps. For each block, yield (number, states, marks,
+    crossings).
 
-    A mark (`Mark`) belongs to each state. With a finder or with ``see_tangent``, all steps of the block are yielded,
-    else every ``stride``-th and the last.
+    The number is the step number of the first state. Each state has a mark, a `Mark`. With a finder or with
+    ``see_tangent``, the states after all steps of the block are yielded; otherwise those after every ``stride``-th step
+    and the last.
     """
     marks: list[Mark] = []
 

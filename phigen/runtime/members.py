@@ -18,14 +18,16 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: Ensembles are divided into parts whose numbers of members are multiples of this number, and hence of every SIMD
-#: width. So a member is in the same SIMD batch for any number of parts, and the bits of its result do not change.
+#: Ensembles are divided into parts. The number of members in each part but the last is a multiple of this number, and
+#: so of every SIMD width. Each member is then in the same SIMD batch, and has the same bits, for any number of parts.
 PART_GRANULARITY = 32
 
-#: Number of steps, summed over members, that take longer than the start of another thread.
+#: Smallest number of steps, summed over members, for which another thread is started. Fewer steps take less time than
+#: the start of a thread.
 _STEPS_PER_THREAD = 20_000
 
-#: Largest numbers of members, and of steps summed over members, in one call of C: Python handles Ctrl-C between calls.
+#: Number of members in one call of C. If the steps are few, a call has more members, up to the number of steps summed
+#: over members. Python handles Ctrl-C only between calls.
 _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 
@@ -33,9 +35,9 @@ _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 class Members:
     """Arguments of an ensemble: initial states (members, DIM), and ``h``, ``t0`` and parameters, as arrays.
 
-    An array of shape () holds for all members, an array (members,) has a value for each. ``paths`` (members,) select
-    the random numbers of each member, together with the seed and the first step of ``draws``. The states after every
-    ``stride`` steps are stored, or only the final states if ``stride`` is 0.
+    An array of shape () holds for all members. An array (members,) has a value for each member. ``paths`` (members,),
+    with the seed and the first step of ``draws``, select the random numbers of each member. The states after every
+    ``stride`` steps are stored. If ``stride`` is 0, only the final states are stored.
     """
 
     x0: Floats
@@ -129,8 +131,9 @@ def shared_out(members: Members, threads: int | None, make: Callable[[slice], No
 
 
 def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]) -> None:
-    """Call ``make`` for each part, in ``threads`` threads. If a call raises, parts that have not begun are
-    cancelled."""
+    """Call ``make`` for each part, in ``threads`` threads. If a call raises an error, parts that have not begun are
+    cancelled.
+    """
     if threads == 1:
         for part in parts:
             make(part)

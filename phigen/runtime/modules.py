@@ -10,7 +10,7 @@ from types import ModuleType
 def load_module(source: str, name: str) -> ModuleType:
     """Return the module that a source text defines; tracebacks show its lines."""
     filename = f"<phigen {name} {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
-    # With None as modification time, linecache.checkcache keeps this entry, so tracebacks can show the lines.
+    # linecache keeps an entry whose modification time is None, so tracebacks can show the lines.
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     module = ModuleType(name)
     module.__file__ = filename

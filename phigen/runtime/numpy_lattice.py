@@ -54,8 +54,9 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def _begin(self) -> None:
-        """Initialise the physical time of a lattice with a monitor (rescaled time: dt = g dτ). Raises `ValueError` if g
-        ≤ 0 at the start.
+        """Set the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ).
+
+        Raises `ValueError` if g ≤ 0 at the start.
         """
         if hasattr(self._module, "_begin"):
             self._module._begin(self._sites, self._x)
@@ -99,8 +100,10 @@ class NumpyLatticeSession:
         return np.array(carried).reshape(vectors.shape)
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """Make one step for each row of ``increments`` (steps, parts, sources, *sizes), the random increments of the
-        noise."""
+        """Make one step for each row of ``increments`` (steps, parts, sources, *sizes).
+
+        The increments replace the random increments of the noise.
+        """
         try:
             for row in increments:
                 self._sites.increments = row
@@ -114,7 +117,7 @@ class NumpyLatticeSession:
         if h != self._h:
             try:
                 self._h, self._rows = h, self._module._coefficients(self._sites, h)
-            except ValueError:  # raised if no state after the step is finite; the C reports this as a status
+            except ValueError:  # raised if a coefficient is not finite; the C reports a status
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 
@@ -124,15 +127,13 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, if a monitor (rescaled time: dt = g dτ) makes steps equal in
-        τ; else {}.
+        """Return the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ); else
+        {}.
         """
         return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ, not
-        in t.
-        """
+        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
         return float(sum(self._sites.clock))
 
     def hold(self, level: float) -> None:
@@ -256,6 +257,6 @@ class NumpyLattice:
         except self._module.StepError as error:
             raise BackendError(error.status, error.step, error.states) from None
         except ValueError:
-            self.start(x0, parameters, t0).prepare(h)  # raises `BackendError` if the step size is the reason
+            self.start(x0, parameters, t0).prepare(h)  # raises `BackendError` if a coefficient is not finite for this h
             raise BackendError("BAD_ARGUMENT", 0, x0[None]) from None
         return pulled_back

@@ -42,10 +42,10 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Flo
 
 
 def _refused(module: Any, members: Members) -> list[int]:
-    """Return the numbers of members for which no step is possible: parameters are not admissible, or g ≤ 0 at the
-    start.
+    """Return the numbers of the members for which no step is possible.
 
-    g is the monitor of the spec, the rescaling of time dt = g dτ.
+    Either their parameters are not admissible, or the monitor g (rescaled time: dt = g dτ) is not positive at their
+    start.
     """
     values = module._values(dict(members.parameters))
     refused = set(map(int, module._refused(values, members.x0))) if hasattr(module, "_refused") else set()
@@ -56,12 +56,12 @@ def _refused(module: Any, members: Members) -> list[int]:
 
 
 class MemberBatch:
-    """The members that have not failed, and the variables of the loop that steps them.
+    """The members that have not failed, and the variables of the loop over steps.
 
     ``who`` are the numbers of these members and ``x`` their states. ``final`` and ``turned`` have the last state and
-    the last attitude of all members, failed ones included. ``failures`` maps failed members to their status;
+    the last attitude of all members, including failed members. ``failures`` maps failed members to their status.
     ``failed_at`` is the number of steps before the first failure. ``first`` (members, numbers) are initial attitudes,
-    None if the spec has none.
+    None if the spec has no attitude.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
@@ -98,19 +98,16 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Apply the inverse of the corrector of the method, if it has one, before a sequence of steps.
-
-        A corrector is a map at the end of a sequence of steps.
-        """
+        """Apply the inverse corrector before a sequence of steps, if the method has a corrector."""
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the corrector of the method, if it has one: a map whose inverse was applied before a sequence of steps.
+        """Apply the corrector after a sequence of steps, if the method has a corrector.
 
-        Members whose result is not finite fail, and get back their states from before the sequence.
+        If the result of a member is not finite, this member fails, and gets back its state from before the sequence.
         """
         if not self._running:
             return
@@ -123,8 +120,7 @@ class MemberBatch:
     def _state(self) -> tuple[Floats, Floats]:
         """Return the states of the remaining members, and the compensation terms of these states.
 
-        If the method has a corrector, a map after the last step, the returned states are those to which the corrector
-        has been applied.
+        If the method has a corrector, it is applied to the states that are returned.
         """
         if not self._running:
             return self.x, self._carry
@@ -148,8 +144,8 @@ class MemberBatch:
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
 
     def _of_step(self) -> tuple[Any, ...]:
-        """Return the arguments, besides the state, of the stages of the next step: time, step size, and increments of
-        noise.
+        """Return arguments for the stages of the next step: time, step size and, if the system has noise, its
+        increments.
         """
         time_and_step = self._t0 + self._done * self._h, self._h
         return (*time_and_step, self._drawn(self._done)) if hasattr(self._module, "_drawing") else time_and_step
@@ -179,8 +175,8 @@ class MemberBatch:
         return {}
 
     def _leave(self, failed: dict[int, str]) -> None:
-        """Remove failed members. The predictors of the remaining members do not change, so neither do the bits of their
-        states.
+        """Remove failed members. The predictors of the remaining members are not changed, so the bits of their states
+        do not depend on this removal.
         """
         remaining = np.delete(np.arange(len(self.who)), list(failed))
         self._report()
@@ -188,7 +184,8 @@ class MemberBatch:
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
-        # The axis of members is the last but one: arrays of Gauss methods are (unknowns, members, stages).
+        # The axis of members is the last but one, or the first: arrays are (members, DIM) or, in Gauss methods,
+        # (unknowns, members, stages).
         self._memory = [
             (np.take(a, remaining, max(a.ndim - 2, 0)), np.take(b, remaining, max(b.ndim - 2, 0)))
             for a, b in self._memory

@@ -1,9 +1,9 @@
 """Solver and sessions in NumPy, which call the functions of a generated module.
 
-Sessions call the functions that the module's ``integrate`` consists of: ``_values``, ``_admissible``,
-``_coefficients``, ``_advance``; ``_renewed`` if the Hamiltonian depends on the time, ``_tangent_stage`` for tangents,
-``_time_of`` with a monitor, and further ones for attitudes. Ensembles (`phigen.runtime.numpy_members`) call the same
-functions.
+Sessions call the functions from which the module's ``integrate`` is made: ``_values``, ``_admissible``,
+``_coefficients`` and ``_advance``. If the Hamiltonian depends on the time, they also call ``_renewed``; for tangents
+``_tangent_stage``; with a monitor ``_time_of``; and further functions for attitudes. Ensembles
+(`phigen.runtime.numpy_members`) call the same functions.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from phigen.runtime.numpy_lattice import NumpyLattice
 from phigen.runtime.numpy_members import ensemble
 
 Pair = tuple[Floats, Floats]
-#: Data of a stage of a step, as the generated module makes and reads them: coefficients, parameters, step size, and the
-#: time if H depends on it.
+#: Data of a stage of a step: coefficients, parameters, step size, and the time if H depends on the time. Functions of
+#: the generated module make and read these data.
 Stage = tuple[Any, ...]
 
-#: A completed stage of a step: its data, the state and the compensation term at its start, and the solution of its
-#: equation.
+#: A completed stage of a step: the data of the stage, the state and its compensation term before the stage, and the
+#: solution of the equation of the stage.
 CompletedStage = tuple[Stage, Floats, Floats, Floats]
 
 
@@ -42,8 +42,8 @@ class AttitudeState(NamedTuple):
     """Attitude of a session, as a product of group elements.
 
     ``first`` is the group element at the time ``begun``. ``element`` is the product of the increments of all steps
-    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time due to the Casimirs that are
-    subtracted from H; None if there are none.
+    since that time, and ``lost`` is the compensation term of this product. ``rate`` is the rotation per unit of time
+    that is due to the Casimirs subtracted from H; None if no Casimirs are subtracted.
     """
 
     first: Floats
@@ -65,7 +65,7 @@ class AttitudeState(NamedTuple):
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Return the name, in a saved session, of one of the two arrays from which a stage predicts its next solution."""
+    """Return the name under which a saved session has part 0 or 1 of the predictor of a stage."""
     return f"memory_{stage}_{part}"
 
 
@@ -83,8 +83,8 @@ class NumpySession:
         draws: Draws = FIRST_DRAWS,
     ) -> None:
         self.steps, self._draws = 0, draws
-        # Time and number of steps at the last change of the step size. Later times are this time plus a multiple of h,
-        # so rounding errors do not accumulate.
+        # Time and number of steps when the step size last changed. Later times are this time plus a multiple of h, so
+        # rounding errors do not accumulate.
         self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
         self._renewed = hasattr(module, "_renewed")
@@ -117,12 +117,13 @@ class NumpySession:
 
     def kick(self, change: Floats) -> None:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
-        if hasattr(self._module, "_with_new_step"):  # the last solution still predicts the next one
+        if hasattr(self._module, "_with_new_step"):  # the last solution is used to predict the next one
             self._memory = [self._module._with_new_step(pair, 1.0) for pair in self._memory]
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Replace the state and its compensation term. Predictors are differences from the state, and are not
-        changed."""
+        """Replace the state and its compensation term. Predictors are not changed, since they are differences from the
+        state.
+        """
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
@@ -182,10 +183,9 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps between the inverse of the corrector of the method and the corrector.
+        """Apply the inverse corrector of the method, make steps, then apply the corrector.
 
-        The inverse is applied before the first step, and the corrector after the last step. If no step succeeds, or if
-        one of these two maps fails, the state is unchanged.
+        If no step succeeds, or if the corrector or its inverse fails, the state is unchanged.
         """
         start, status = (self._x, self._carry, self.steps), ""
         try:
@@ -207,9 +207,8 @@ class NumpySession:
     def _follow(self, flows: str) -> None:
         """Apply the corrector of the method, or its inverse, to the state.
 
-        A corrector is a map after the last step of a run; its inverse comes before the first step. The generated module
-        has the flows of the map to apply in a list with the name ``flows``: "BEGIN" for the inverse, "END" for the
-        corrector.
+        ``flows`` is "BEGIN" for the inverse, which is applied before the first step, and "END" for the corrector, which
+        is applied after the last step. These are the names of lists of flows in the generated module.
         """
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
@@ -235,7 +234,7 @@ class NumpySession:
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         if hasattr(self._module, "_followed"):
-            self.advance(h, 1)  # repeats the step with the inverse of the corrector before it, the corrector after it
+            self.advance(h, 1)  # repeats the step between the inverse corrector and the corrector
         else:
             self._commit(x, carry, memory, stages)
         return tangent
@@ -307,9 +306,10 @@ class NumpySession:
             return stages
 
     def _of_step(self, increments: Floats | None) -> tuple[Any, ...]:
-        """Return the arguments, besides the state, of the stages of the next step: time, step size and noise.
+        """Return arguments for the stages of the next step: time, step size and, if the system has noise, its
+        increments.
 
-        The noise is ``increments`` or, if these are None, random numbers.
+        The increments are ``increments`` or, if this is None, random numbers.
         """
         if not hasattr(self._module, "_drawing"):
             return self._now(), self._h
@@ -320,7 +320,7 @@ class NumpySession:
     def _attempted_step(
         self, increments: Floats | None = None
     ) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
-        """Compute one step without changing the session: return state, compensation term, predictors, and completed
+        """Compute one step without changing the session. Return state, compensation term, predictors, and completed
         stages.
 
         Raises `BackendError`.

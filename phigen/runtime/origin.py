@@ -2,9 +2,9 @@
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
 run``. The line is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
-figures, films and pages. A ``.csv`` cannot contain it, since some programs would read it as data. The origin of a
-``.csv`` is in the file ``FILE-metadata.json`` beside it, where the W3C recommendation "Metadata Vocabulary for Tabular
-Data" puts metadata.
+figures, films and pages. A ``.csv`` cannot contain the line, since some programs would read it as data. The line is
+then in the file ``FILE-metadata.json`` beside the ``.csv``. This is the place for metadata in the W3C recommendation
+"Metadata Vocabulary for Tabular Data".
 """
 
 from __future__ import annotations
@@ -104,8 +104,9 @@ def read_origin(path: Path) -> Origin | None:
 
 
 def _of_table(path: Path) -> Origin | None:
-    """Return the origin in the metadata file of a ``.csv``; None unless that file lists the columns of this
-    ``.csv``."""
+    """Return the origin in the metadata file of a ``.csv``; None if the columns listed there are not those of the
+    ``.csv``.
+    """
     try:
         described = json.loads(companion(path).read_text(encoding="utf-8"))
         titles = [column["titles"] for column in described["tableSchema"]["columns"]]

@@ -134,7 +134,7 @@ class Propagation:
         """Return the derivatives of the result of `run` by x0 and, by name, by each parameter.
 
         The derivative by x0 has the shape of the result and a last axis (DIM,), the derivative by a parameter the shape
-        of the result. Each component of a member's result takes one reverse pass. Not for lattices.
+        of the result. Each component of a member's result takes one reverse pass. Solvers of lattices have no Jacobian.
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
@@ -170,7 +170,10 @@ class Propagation:
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return the transpose of broadcasting: ``values`` summed over broadcast axes, so that the result has ``shape``."""
+    """Return ``values`` summed over the axes along which an array of this ``shape`` was broadcast.
+
+    This sum is the transpose of broadcasting.
+    """
     extra = values.ndim - len(shape)
     values = values.sum(axis=tuple(range(extra)))
     ones = tuple(k for k, length in enumerate(shape) if length == 1 and values.shape[k] != 1)

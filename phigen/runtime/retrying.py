@@ -21,7 +21,7 @@ class Retrying(Forwarding[Followed]):
         super().__init__(session)
         self.most = limit
         self.retried: list[int] = []
-        self._extra = 0  # steps of the session minus whole steps: n - 1 is added for a step made as n smaller steps
+        self._extra = 0  # steps of the session minus whole steps; a step made as n smaller steps adds n - 1
 
     @property
     def steps(self) -> int:

@@ -1,7 +1,7 @@
 """Runs that a spec names, for `Solver.run` and `LatticeSolver.run`: their settings, ends and rows.
 
-`changed` returns a run of a spec with other settings. `rows_of` integrates two kinds of runs of ordinary systems for
-which `Solver.integrate` has no arguments: runs that stop at a zero of a function, and runs with rows at given times.
+`changed` returns a run of a spec with other settings. `rows_of` integrates runs of ordinary systems that the arguments
+of `Solver.integrate` cannot describe: runs that stop at a zero of a function, and runs with rows at given times.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phigen.spec.runs import with_step
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a run that replace settings of the spec; where a field is None, the setting of the spec applies."""
+    """Settings that replace the settings of a run of the spec. A field that is None replaces nothing."""
 
     step: float | None = None
     steps: int | None = None
@@ -52,7 +52,7 @@ def run_named(spec: Spec | None, name: str | None) -> Run:
 
 
 def changed(spec: Spec, run: Run, settings: Settings) -> Run:
-    """Return the run with those settings that are not None in place of the settings of the spec.
+    """Return the run with other settings. A setting that is None leaves the setting of the spec as it is.
 
     Raises `ValueError` for invalid settings, and `TypeError` for settings that exclude each other.
     """
@@ -147,10 +147,9 @@ def spans_of(interval: float, span: float) -> list[float]:
 
 
 def spans_of_run(run: Run, span: float) -> list[float]:
-    """Return the times after the start at which a run with ``every`` or ``at`` has rows, strictly between 0 and
-    ``span``.
+    """Return the times of the inner rows of a run with ``every`` or ``at``, counted from the start of the run.
 
-    ``span`` is the time from the start to the end of the run.
+    Inner rows lie strictly between the start and the end. ``span`` is the time from the start to the end of the run.
     """
     if run.every is not None:
         return spans_of(float(run.every), span)
@@ -159,11 +158,11 @@ def spans_of_run(run: Run, span: float) -> list[float]:
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield, for each row of a run, a session at the row and its number of steps; the first row is the start.
+    """Yield a session at each row of a run, with its number of steps. The first row is the start.
 
-    Rows are at the times that ``run.every`` or ``run.at`` gives, else at every ``run.stride``-th step. The last row is
-    the end, which may lie inside a step: its number of steps then has a fraction. The caller must read a session before
-    it asks for the next one. Raises `BackendError`.
+    Rows are at the times that ``run.every`` or ``run.at`` gives; without these keys they are at every ``run.stride``-th
+    step. The last row is the end. If the end lies inside a step, its number of steps has a fraction. The caller must
+    read a session before it asks for the next one. Raises `BackendError`.
     """
     yield session, 0.0
     yield from _timed_rows(session, run, end) if run.is_timed else _strided_rows(session, run, end)
@@ -179,10 +178,10 @@ def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Sessio
 
 
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield, for each row at a given time before the end, a session at that time and its number of steps.
+    """Yield a session at each row before the end, with its number of steps, for rows at given times.
 
-    The times are the multiples of ``run.every`` or the times ``run.at``. A time between two steps is reached by a
-    shorter step from the last whole step before it, and its number of steps has a fraction.
+    The times are the multiples of ``run.every``, or the times ``run.at``. A time between two steps is reached by a
+    shorter step from the last whole step before it; the number of steps then has a fraction.
     """
     h = float(run.step)
     for span in spans_of_run(run, end.span):

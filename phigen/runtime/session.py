@@ -47,8 +47,7 @@ class Followed(Course, Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start, if a monitor (rescaled time: dt = g dτ) makes steps equal in τ;
-        else NaN.
+        """Return the physical time since the start if there is a monitor (rescaled time: dt = g dτ); else NaN.
 
         Without a monitor, the time follows from the number of steps.
         """
@@ -88,8 +87,9 @@ class Session(Followed, Protocol):
     def interpolated(self, fractions: Sequence[float]) -> Floats | None:
         """Return states (fractions, DIM) inside the last step, from the polynomial of a collocation method.
 
-        Fraction 0 is the start of the step, fraction 1 its end. The states are far less accurate than steps, and serve
-        to locate events. Returns None if the method has no polynomial, or if the state was changed after the last step.
+        Fraction 0 is the start of the step, fraction 1 its end. These states are far less accurate than the states
+        after steps; use them only to locate events. Returns None if the method has no polynomial, or if the state was
+        changed after the last step.
         """
         ...
 
@@ -138,8 +138,8 @@ def rows_along(
         except BackendError as error:
             good_steps = session.steps
             complete_rows = states[: len(row_steps(good_steps, stride))].copy()
-            # The last row is the state before the failing step, even if this step does not follow a multiple of the
-            # stride.
+            # The last row is the state before the failing step, even if the number of steps before it is no multiple of
+            # the stride.
             complete_rows[-1] = session.state()
             see(len(complete_rows) - 1)
             raise BackendError(error.status, good_steps, complete_rows) from error

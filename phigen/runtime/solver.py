@@ -43,8 +43,8 @@ class Marks:
 
     ``tau`` (rows,) is h times the number of steps. With a monitor (rescaled time: dt = g dτ) this is the rescaled time
     τ, and ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and
-    positions. ``steps`` is the number of all steps. ``retried`` are the numbers of those steps that failed and were
-    repeated as smaller steps.
+    positions. ``steps`` is the number of steps of the whole trajectory. ``retried`` are the numbers of those steps that
+    failed and were repeated as smaller steps.
     """
 
     tau: Floats
@@ -58,7 +58,7 @@ class Solver(Named[Backend, Interface]):
     """A compiled system: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, mass=2)``.
 
     Parameters of the system are keyword arguments, or entries of ``parameters={…}``, which also takes names that clash
-    with other arguments. Parameters that are not passed have their defaults of the spec. Wrong arguments raise
+    with other arguments. Parameters that are not passed have the defaults of the spec. Wrong arguments raise
     `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Parameters with which no step is possible, such
     as a zero divisor, raise `phigen.ParameterError`, which is a `ValueError` and a `StepError`. Several threads may use
     a solver. Solvers can be copied and pickled; C that is not in the cache is then compiled again.
@@ -98,13 +98,13 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Trajectory:
-        """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), and return the trajectory of every ``stride``-th state
-        and the last.
+        """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), and return every ``stride``-th state and the last as a
+        trajectory.
 
         A negative ``h`` integrates backwards in time; with a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ.
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of
         ``steps``, the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry
-        smaller steps; together they are another map than one whole step, but also a Poisson map, and keep the Casimirs.
+        smaller steps. Together, these are a Poisson map that keeps the Casimirs, but not the map of one whole step.
         ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by default the identity
         and the origin.
 
@@ -197,9 +197,9 @@ class Solver(Named[Backend, Interface]):
         return self._rows(run_, self._beginning(start, "x0", float(run_.step), values, {}, t0, noise_arguments))
 
     def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
-        """Return the trajectory of a run that ends at a zero of a function, or has rows at given times.
+        """Return the trajectory of a run that ends at a zero of a function, or that has rows at given times.
 
-        `integrate` has no arguments for a run of either kind.
+        `integrate` has no arguments for such ends or rows.
         """
         names = self.interface
         stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None
@@ -364,7 +364,7 @@ class Solver(Named[Backend, Interface]):
         """Return the zeros of ``g`` along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
         ``g`` maps states (rows, DIM), and their times (rows,) if the Hamiltonian depends on the time, to values
-        (rows,). Each zero is located to round-off by steps of the solver, of the size that leads to the zero.
+        (rows,). Each zero is located to round-off; a step of the solver leads to it, so no state is interpolated.
         ``direction`` is ``rising``, ``falling`` or ``both``. A start with g = 0 counts if g leaves zero in that
         direction. Raises `StepError`, whose ``trajectory`` is the `Section` until the failure.
         """
@@ -639,7 +639,7 @@ class Solver(Named[Backend, Interface]):
         noise_arguments: Mapping[str, int | None] = arguments.NONE_DRAWN,
         first: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     ) -> Beginning:
-        """Return the checked arguments of a trajectory; the step size is NaN if it is not known yet."""
+        """Return the checked arguments of a trajectory. The step size is NaN if ``h`` is None."""
         begin = arguments.start_time(t0, self.interface, by_keyword)
         draws = arguments.draws(self.interface, by_keyword, noise_arguments)
         values = self.values(parameters, by_keyword)
@@ -720,7 +720,7 @@ class Solver(Named[Backend, Interface]):
                 return ParameterError(
                     message, step=0, status=error.status, trajectory=trajectory, members=error.members
                 )
-            # Only the parameters are listed: the other arguments were checked before.
+            # The message lists only the parameters, since the other arguments were checked before.
             settings = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made"
             if settings:

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeTrajectory
     from phigen.spec.model import CorrelationChoice, SpectrumChoice
 
-#: Smallest number of frames for a spectrum. The Hann window spreads a wave over about four frequencies, so with fewer
-#: frames a spectrum shows nothing.
+#: Smallest number of frames for a spectrum. The Hann window spreads a wave over about four frequencies, and a spectrum
+#: of fewer frames has fewer frequencies.
 LEAST_FRAMES = 4
-#: Times between frames count as equal if they differ by less than this fraction.
+#: Relative difference below which two times between frames count as equal.
 _EQUAL = 1e-6
 
 
@@ -84,9 +84,10 @@ class DynamicSpectrum:
 
 @dataclass(frozen=True)
 class Correlation:
-    """Correlation ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of the two fields named in ``of``.
+    """Correlation ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of the two coordinates f and g named in ``of``.
 
-    ``values`` (distances,) are for d = 0, 1, … sites along an ``axis``.
+    ⟨ ⟩ is the mean over the sites r and over frames. ``values`` (distances,) are for d = 0, 1, … sites along an
+    ``axis``.
     """
 
     values: Floats
@@ -96,9 +97,7 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """Settings of the ``spectrum`` and of the ``correlation`` that a run requests; None for one that is not
-    requested.
-    """
+    """Settings of the ``spectrum`` and of the ``correlation`` that a run requests; None without such a request."""
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
@@ -162,9 +161,9 @@ def correlation(
 ) -> Floats:
     """Return the correlations ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites along an axis, (up_to + 1,).
 
-    f is the coordinate ``of``, g the coordinate ``other``. Means are over all sites (along an open axis over those with
-    r + d on the lattice), and over the frames from the time ``after`` on. Raises `ValueError` for lattices that are not
-    grids, and for unknown coordinates or axes.
+    f is the coordinate ``of``, g the coordinate ``other``. ⟨ ⟩ is the mean over the sites r, and over the frames from
+    the time ``after`` on. If the axis is open, ⟨f(r) g(r + d)⟩ is only over the sites r for which r + d is on the
+    lattice. Raises `ValueError` for lattices that are not grids, and for unknown coordinates or axes.
     """
     _expect_grid(run, "a correlation")
     if axis not in run.axes:
@@ -189,10 +188,10 @@ def correlation(
 
 
 def equal_times(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames from which a spectrum is computed: frames from the time ``after`` on.
+    """Return the times of the frames for a spectrum: of all frames from the time ``after`` on.
 
-    If the last frame is at a shorter distance, it is left out. Raises `ValueError` for fewer than four frames, and for
-    unequal distances in time.
+    A last frame at a shorter distance is left out. Raises `ValueError` for fewer than four frames, and for unequal
+    distances in time.
     """
     frames = _later(t, h, after)
     if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
@@ -211,8 +210,8 @@ def expect_frames(t: Floats, h: float, after: float | None) -> None:
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times in ``t`` that the run reaches at the time ``after`` or later. If h < 0, the run goes backwards,
-    so these are the times up to ``after``.
+    """Return the times in ``t`` from the time ``after`` on. If h < 0, the run goes backwards, and these are the times
+    up to ``after``.
     """
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]

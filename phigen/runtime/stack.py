@@ -18,16 +18,16 @@ from phigen.targets.header import plain
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
-#: Names in gcc's call graph: the name for all calls through a pointer, and the beginning of the names of the functions
-#: of OpenMP, which call functions through pointers.
+#: Names in gcc's call graph that stand for calls through pointers: the name of all such calls in the solver, and the
+#: beginning of the names of OpenMP's functions, which call functions through pointers.
 _BY_POINTER = ("__indirect_call", "GOMP_")
 _TIMEOUT = 300.0  # time limit of a command of the compiler, in seconds
 
 
 @dataclass(frozen=True)
 class CallGraph:
-    """Call graph of a solver: the ``stack`` of each function in bytes, and the names of the functions that it
-    ``calls``.
+    """Call graph of a solver. ``stack`` is the size of each function's stack in bytes, ``calls`` the names of the
+    functions that it calls.
 
     The stack of library functions is unknown. ``kinds`` has gcc's word for each function: ``static`` if the number of
     bytes is exact, ``dynamic,bounded`` if it is an upper bound, and ``dynamic`` if there is no bound.
@@ -38,11 +38,11 @@ class CallGraph:
     kinds: Mapping[str, str]
 
     def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
-        """Return the largest stack, in bytes, that a call of ``function`` needs, with all calls that it leads
-        to.
+        """Return the largest stack, in bytes, that a call of ``function`` needs, including the functions that
+        it calls.
 
-        Library functions are not counted. ``above`` are the functions that lead to this call. Raises `ToolchainError`
-        if a function can call itself.
+        Library functions are not counted. ``above`` are the functions whose calls led to this call. Raises
+        `ToolchainError` if a function can call itself.
         """
         if function in above:
             raise ToolchainError(f"{function} can call itself: {' → '.join((*above, function))}")
@@ -56,10 +56,10 @@ class CallGraph:
 
 
 def stack_bound(files: Mapping[str, str], name: str, flags: str) -> StackBound:
-    """Return a bound for the stack of a solver in C, compiled with ``flags`` by the compiler named in CC, or else by
-    gcc.
+    """Return a bound for the stack of a solver in C.
 
-    Raises `ToolchainError` if the compiler writes no call graph, or if the stack has no bound.
+    The solver is compiled with ``flags`` by the compiler named in CC, or else by gcc. Raises `ToolchainError` if the
+    compiler writes no call graph, or if the stack has no bound.
     """
     words = tuple(shlex.split(flags))
     graph = call_graph(files, name, words)
@@ -114,8 +114,8 @@ def _output(command: Sequence[str], folder: Path | None = None) -> str:
 
 
 def _plain(title: str) -> str:
-    """Return the name of a function from its title in gcc's call graph. Titles of static functions begin with a file
-    name.
+    """Return the name of a function from its title in gcc's call graph, without the file name before static
+    functions.
 
     Names such as ``f.part.0``, which gcc gives to parts and copies of a function f, remain.
     """

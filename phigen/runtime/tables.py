@@ -45,8 +45,9 @@ class TableFile(Protocol):
         ...
 
     def flush(self) -> int:
-        """Write buffered rows to disk, and return the size of the file in bytes, which `opened` takes to continue the
-        table."""
+        """Write buffered rows to disk, and return the size of the file in bytes. `opened` needs the size to continue
+        the table.
+        """
         ...
 
     def close(self, scalars: Mapping[str, Any]) -> None:

@@ -32,16 +32,16 @@ C = TypeVar("C", bound=Clocked)
 
 #: Largest number of iterations of the secant method for a step size; four to seven are usual.
 MAX_SECANTS = 30
-#: Two times count as equal if they differ by at most this number of machine epsilons, relative to their size.
+#: Two times count as equal if their relative difference is at most this number of machine epsilons.
 _ROUNDINGS = 8
 EQUAL = float(_ROUNDINGS * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
-    """Return a copy of a session, advanced by one step that takes the time ``span``, and the size of this step.
+    """Return a copy of a session after one step that takes the time ``span``, and the size of this step.
 
-    The size is in τ if a monitor rescales the time. ``h`` is the size of a usual step, with which the search for the
-    size begins. Raises `BackendError`.
+    The size is in τ if a monitor rescales the time. The search for the size begins with ``h``, the size of a usual
+    step. Raises `BackendError`.
     """
     if not np.isfinite(session.time()):
         return _moved(session, span), span
@@ -79,9 +79,9 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
 
 
 def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
-    """Return the number of whole steps of size h that fit into the time ``span``, and the time that is then left.
+    """Return the number of whole steps of size h that fit into the time ``span``, and the remaining time.
 
-    If a step within the span fails, it is included in the number, so that it also fails for the caller.
+    If a step within the span fails, the number includes this step, so that the caller meets the same failure.
     """
     if not np.isfinite(session.time()):
         whole_count = whole_steps(h, span)
@@ -106,7 +106,7 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
-    """Advance a session by the time ``span``, in steps of size h of which the last is shortened.
+    """Advance a session by the time ``span``, in steps of size h; the last step is shortened.
 
     ``see`` receives the session and h times its number of steps: at the start, at every stride-th step, and at the end.
     Raises `BackendError`.
@@ -145,11 +145,11 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
 
 
 def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
-    """Return the states (times, DIM) at given times of a trajectory with the times ``t`` and the states ``x`` of its
-    rows.
+    """Return the states (times, DIM) of a trajectory at the given ``times``.
 
-    Each state is computed from the nearest row, by steps of size h or −h and a shorter last step. ``session_at(k)``
-    returns a session at row k. Raises `BackendError`.
+    The rows of the trajectory have the times ``t`` and the states ``x``. Each state is computed from the nearest row,
+    by steps of size h or −h and a shorter last step. ``session_at(k)`` returns a session at row k. Raises
+    `BackendError`.
     """
     states = np.empty((len(times), x.shape[1]))
     for k, time in enumerate(np.asarray(times, dtype=np.float64).tolist()):
@@ -175,7 +175,8 @@ def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -
 
 
 def moved_on(session: C, h: float, span: float) -> C:
-    """Return a session at the time ``span`` after the state of ``session``: whole steps, then a shorter step.
+    """Return a session at the time ``span`` after the state of ``session``, by whole steps and a shorter last
+    step.
 
     Raises `BackendError`.
     """

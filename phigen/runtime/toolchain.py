@@ -29,8 +29,8 @@ BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 
 #: Flags for this processor; a flag that the compiler does not accept is left out. Fused multiply-adds change results by
 #: round-off only: the compensated sums of the generated code contain no product that could be fused. The generated code
-#: does not read floating-point exceptions, so traps are off. Then gcc may divide by 0 in a SIMD lane whose value is not
-#: used; without this permission, it does not vectorise loops over pairs on processors without AVX-512.
+#: does not read floating-point exceptions, so traps are off. If traps were on, gcc could not divide by 0 in a SIMD lane
+#: whose value is not used. It would then not vectorise loops over pairs on processors without AVX-512.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 
 #: Flag of compilers for code with OpenMP threads, which only solvers of lattices use.
@@ -40,7 +40,8 @@ OPENMP = "-fopenmp"
 TIMEOUT = 300.0
 
 _CANDIDATES = ("cc", "gcc", "clang")
-#: Python package with a C compiler, and the time limit in seconds for its first use, in which it compiles its runtime.
+#: Python package with a C compiler, and the time limit of its first use in seconds. In its first use the package
+#: compiles its runtime.
 _PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
 _HINT = (
     "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
@@ -53,7 +54,7 @@ _GRACE = 1.0  # seconds that child processes of a compiler may run after the com
 _TRIAL = "#include <math.h>\ndouble trial(double x);\ndouble trial(double x) { return sin(x); }\n"
 _TRIAL_OF_THREADS = "#include <omp.h>\nint trial(void);\nint trial(void) { return omp_get_max_threads(); }\n"
 
-#: First bytes of the files of shared libraries: ELF, Mach-O of both byte orders and universal, PE.
+#: First bytes of shared libraries: of ELF, of Mach-O (both byte orders, and universal), and of PE.
 _ELF = b"\x7fELF"
 _LIBRARIES = (_ELF, b"\xfe\xed\xfa", b"\xce\xfa\xed\xfe", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
 _ELF_SHARED = 3
@@ -221,8 +222,9 @@ def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> 
 def _compile_library(
     command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float
 ) -> str:
-    """Compile a library, and return "". If this fails, return the reason as the end of a sentence about the
-    compiler."""
+    """Compile a library. Return "" or, if the compilation fails, the reason as the end of a sentence about the
+    compiler.
+    """
     code, messages = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
     if code:
         return _failure_text(code, messages)
@@ -245,8 +247,7 @@ def _head(path: Path) -> bytes | None:
 
 
 def _failure_text(code: int, messages: str) -> str:
-    """Return a message about a failed compiler, as the end of a sentence, with the first lines of the compiler's
-    output."""
+    """Return the end of a sentence about a compiler that failed, with the first lines of its output."""
     ending = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
     lines = messages.strip().splitlines()
     if not lines:
@@ -276,8 +277,8 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
         return 126, f"it could not be started: {error.strerror or error}"
     with process:
         listener = threading.Thread(target=listen, args=(process.stdout,), daemon=True)
-        # join(timeout) of a thread that waits returns as soon as the process ends; `process.wait(timeout)` would poll
-        # the process every twentieth of a second.
+        # A thread waits for the process, since join(timeout) returns as soon as the thread ends.
+        # `process.wait(timeout)` would poll the process every twentieth of a second.
         waiter = threading.Thread(target=process.wait, daemon=True)
         listener.start()
         waiter.start()
@@ -286,7 +287,7 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
             if waiter.is_alive():
                 raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
-        # Processes are killed after Ctrl-C too: its signal does not reach them, since they run in a session of their
+        # Processes are killed after Ctrl-C too. They do not receive its signal, since they run in a session of their
         # own.
         finally:
             if waiter.is_alive() or listener.is_alive():

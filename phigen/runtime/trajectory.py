@@ -76,8 +76,8 @@ class Trajectory:
         return cast("Figure", display("figure of runs")({"phigen": self}, {}))
 
     def to_xarray(self) -> xr.Dataset:
-        """Return an `xarray.Dataset` with the variables ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and
-        observables (t).
+        """Return an `xarray.Dataset` with the variables ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t),
+        and the observables (t).
 
         The step size and the parameters are attributes. Raises `MissingPackageError` without xarray.
         """
