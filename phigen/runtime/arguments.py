@@ -53,8 +53,8 @@ class Beginning:
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
     """Return the energy level e that the argument ``gauge`` sets, and remove this argument.
 
-    Only lattices with a monitor (rescaled time: dt = g dτ) have this argument. Returns None if it is missing; e is then
-    −H of the initial state. Raises `ValueError` unless the value is one finite number.
+    Only lattices with a monitor (rescaled time: dt = g dτ) have this argument. If the argument is missing, returns
+    None; e is then −H of the initial state. Raises `ValueError` unless the value is one finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None
@@ -145,9 +145,9 @@ def increments(values: ArrayLike, interface: Interface) -> Floats:
 
 
 def expect_no_noise(argument: str, interface: Interface) -> None:
-    """Raise `TypeError` if the system has noise; called for arguments that need shortened steps.
+    """Raise `TypeError` if the system has noise. Called for arguments that need shortened steps.
 
-    The parts of a step would use other random numbers than the whole step.
+    Shorter steps would use other random numbers than whole steps.
     """
     if interface.noise:
         raise TypeError(f"{argument} is not available with noise: a shorter step would draw other random numbers")

@@ -90,7 +90,7 @@ class CSolver:
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
-        """Return the session that was saved as bytes, as `phigen.runtime.backend.Backend.restored` says.
+        """Return the session from its saved bytes; see `phigen.runtime.backend.Backend.restored`.
 
         ``parameters`` is not used, since the bytes contain the parameters.
         """

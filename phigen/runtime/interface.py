@@ -81,9 +81,10 @@ class LatticeInterface(Interface):
     """Interface of the solver of a lattice, whose states have the shape (coordinates, *sizes).
 
     ``coordinates`` are the coordinates of one site. Parameters in ``at_sites`` have a value at each site, parameters in
-    ``at_bonds`` a value at each bond of a graph. ``casimir_kinds`` has one entry per Casimir: ``sites`` if each site
-    has its own, ``sum`` or ``product`` if one number is the sum or product of densities over all sites. The number of
-    sites along an axis is a multiple of its entry in ``periods``, and at least its entry in ``least``.
+    ``at_bonds`` a value at each bond of a graph. ``casimir_kinds`` has one entry per Casimir: ``sites`` for a Casimir
+    with a value at each site, and ``sum`` or ``product`` for the sum or the product of densities over all sites.
+    ``periods`` and ``least`` have one number per axis. The number of sites along an axis must be a multiple of its
+    period, and at least the number in ``least``.
     """
 
     axes: tuple[str, ...] = ()

@@ -474,8 +474,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def _planned(
         self, beginning: Beginning, steps: int | None, stride: int, until: float | None, retry: int
     ) -> IntegrationPlan:
-        """Return the plan of an integration over a number of steps, or up to the time ``until``; exactly one must be
-        passed."""
+        """Return the plan of an integration over a number of steps, or up to the time ``until``.
+
+        Exactly one of ``steps`` and ``until`` must be passed.
+        """
         if (steps is None) == (until is None):
             requirement = "needs the number of steps, or the time until which to integrate"
             raise TypeError(f"integrate {requirement if steps is None else 'takes either steps or until, not both'}")

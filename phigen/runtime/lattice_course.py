@@ -146,8 +146,9 @@ class LatticeCourse:
 
     @classmethod
     def restored(cls, solver: LatticeSolver, beginning: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
-        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which it
-        began."""
+        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which the
+        integration began.
+        """
         course = object.__new__(cls)
         course.__setstate__({"solver": solver, "at": beginning, "saved": arrays})
         return course
@@ -193,8 +194,9 @@ class ObservedCourse(Retrying):
     def restored(
         cls, solver: LatticeSolver, beginning: Beginning, retry: int, arrays: Mapping[str, Any]
     ) -> ObservedCourse:
-        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which it
-        began."""
+        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which the
+        integration began.
+        """
         course = cls(cast("Followed", LatticeCourse.restored(solver, beginning, arrays)), retry)
         course._extra, *course.retried = arrays["parts"].tolist()
         return course

@@ -55,8 +55,9 @@ class RowSteps:
 
 
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
-    """Return rows after every ``stride``-th step, and a last row at the ``end`` or, without an ``end``, after ``steps``
-    steps.
+    """Return rows after every ``stride``-th step, and a last row at the end of the run.
+
+    The run ends at ``end`` or, if ``end`` is None, after ``steps`` steps.
     """
     if end is None or not end.part:
         whole_rows = row_steps(steps if end is None else end.steps, stride)
@@ -68,8 +69,9 @@ def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSte
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
-    """Return rows at the times ``spans`` after the start, and a last row at the ``end`` or, without an ``end``, after
-    ``steps`` steps.
+    """Return rows at the times ``spans`` after the start, and a last row at the end of the run.
+
+    The run ends at ``end`` or, if ``end`` is None, after ``steps`` steps.
     """
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
@@ -93,10 +95,10 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """Section of a run: the zeros at which a function ``g`` of the observables changes its sign in the
-    ``direction``.
+    """Section of a run: the zeros of a function ``g`` of the observables.
 
-    The direction is ``rising``, ``falling`` or ``both``; ``text`` is the formula of g.
+    The ``direction`` in which g passes through zero is ``rising``, ``falling`` or ``both``. ``text`` is the formula of
+    g.
     """
 
     g: Function

@@ -29,8 +29,9 @@ class LiveSession:
     Properties of its present state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
     name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to
     ``x`` change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters`
-    changes parameters. With a monitor (rescaled time: dt = g dτ), each of these changes sets the energy level e to −H.
-    ``copy()`` returns an independent session. A session that was pickled and loaded continues with the same bits.
+    changes parameters. With a monitor (rescaled time: dt = g dτ), each of these changes sets the energy level e to −H
+    of the present state. ``copy()`` returns an independent session. A session that was pickled and loaded continues
+    with the same bits.
     """
 
     def __init__(

@@ -109,8 +109,8 @@ def cores() -> int:
 def parts(members: Members, threads: int) -> Iterator[slice]:
     """Yield the parts of an ensemble, as slices of its members; each part is integrated by one call of C.
 
-    With several threads there are at least four parts for each thread. Parts are short, since Python handles Ctrl-C
-    only between two calls.
+    Parts are short, since Python handles Ctrl-C only between two calls. With several threads there are about four parts
+    for each thread, or more, if there are enough members.
     """
     count = len(members)
     batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL

@@ -163,7 +163,7 @@ class NumpySession:
         return np.array(self._module._attitude(attitude.first, attitude.element, attitude.rate, elapsed)[0])
 
     def turn_from(self, first: Floats | None) -> None:
-        """Continue the attitude from the group element ``first`` at the present state; None stands for the identity."""
+        """Set the attitude at the present state to the group element ``first``; None stands for the identity."""
         values, identity = self._values(), self._module._identity(1)
         gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
         rate = self._module._rates(values, self._x, gauge)

@@ -125,7 +125,7 @@ def _number(value: float, name: str) -> Fraction:
 def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -> End:
     """Return the end of a run, for a session at the start of the run; the session is not changed.
 
-    ``stop`` is a function of states whose first zero ends the run. If ``timed``, it also receives the time.
+    ``stop`` is a function of states whose first zero ends the run. If ``timed``, ``stop`` also receives the time.
     """
     h, t0 = float(run.step), float(run.start)
     last = at_time(session.branch(), h, float(run.until) - t0) if run.until is not None else None

@@ -61,14 +61,14 @@ class Followed(Course, Protocol):
 class Session(Followed, Protocol):
     """A trajectory being computed by a generated solver.
 
-    The states have the same bits, however the steps are divided into calls of `advance`.
+    The bits of the states do not depend on how the steps are divided into calls of `advance`.
     """
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         """Replace all parameters; state, time, attitude and random numbers are unchanged.
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H. Raises `BackendError` for values that
-        are not admissible.
+        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H of the state. Raises `BackendError` for
+        values that are not admissible.
         """
         ...
 

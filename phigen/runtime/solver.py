@@ -169,10 +169,10 @@ class Solver(Named[Backend, Interface]):
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
         Arguments replace settings of the spec. ``x0`` (DIM,) is the initial state, ``step`` the step size. The run ends
-        after ``steps`` steps or at the time ``until``; a run with ``stop`` ends at the first zero of that expression.
-        Rows are stored every ``stride`` steps, at intervals of ``every``, or at the times ``at``. ``seed`` is that of
-        the noise. Parameters, and initial values of coordinates, are given by name. Raises `ValueError` if there is no
-        run of that name; `runs` lists the names.
+        after ``steps`` steps or at the time ``until``; a run with ``stop`` ends at the first zero of the expression
+        ``stop``. Rows are stored every ``stride`` steps, at intervals of ``every``, or at the times ``at``. ``seed`` is
+        that of the noise. Parameters, and initial values of coordinates, are given by name. Raises `ValueError` if
+        there is no run of that name; `runs` lists the names.
         """
         spec, settings = self.spec, runs.Settings(step, steps, until, stride, every, at=at)
         base = runs.run_named(spec, name)
@@ -435,11 +435,12 @@ class Solver(Named[Backend, Interface]):
     ) -> Turned:
         """Return the states of `ensemble` together with attitudes and positions: (x, attitude, position).
 
-        An attitude is a quaternion (4,) or a matrix (n, n), a position (3,); position is None if the spec has none.
-        Arrays of attitudes and positions have the leading axes of x: (members, …), with a ``stride`` (rows, members,
-        …). ``attitude0`` and ``position0`` are initial values, one for all members or (members, …), by default the
-        identity and the origin. Each member has the same bits as in `integrate`. Raises the errors of `ensemble`, with
-        all three results in ``trajectory``, and `TypeError` if the spec does not say ``reconstruct``.
+        An attitude is a quaternion (4,) or a matrix (n, n). A position is an array (3,). If the spec has no positions,
+        the third result is None. Arrays of attitudes and positions have the leading axes of x: (members, …), with a
+        ``stride`` (rows, members, …). ``attitude0`` and ``position0`` are initial values, one for all members or
+        (members, …), by default the identity and the origin. Each member has the same bits as in `integrate`. Raises
+        the errors of `ensemble`, with all three results in ``trajectory``, and `TypeError` if the spec does not say
+        ``reconstruct``.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         requested = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)

@@ -130,7 +130,7 @@ class Trajectory:
     def moving(self) -> frozenset[str]:
         """The names (``energy``, names of Casimirs) of quantities that explicit time or forces change.
 
-        Figures show their values instead of errors, since their changes are not errors.
+        Figures show the values of these quantities instead of errors, since their changes are not errors.
         """
         return self.solver.interface.moving if self.solver else frozenset()
 

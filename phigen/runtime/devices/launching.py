@@ -112,10 +112,10 @@ class Launcher:
         self.device.launch(self.kernels["copy"], numbers, [np.int32(numbers), source, target])
 
     def reduced(self, buffer: Any, kinds: Sequence[str], length: int) -> Floats:
-        """Reduce each row of ``length`` numbers in a buffer to one number, by the kind of the row, such as ``sum``.
+        """Reduce each row of ``length`` numbers in a buffer to one number.
 
-        The order of the operations depends on the length only, so results have the same bits in every run. NaN in a row
-        gives NaN.
+        ``kinds`` has the reduction of each row, such as ``sum``. The order of the operations depends on the length
+        only, so results have the same bits in every run. NaN in a row gives NaN.
         """
         rows = len(kinds)
         if not rows or not length:

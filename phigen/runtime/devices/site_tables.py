@@ -111,7 +111,7 @@ class SiteTables:
     def _on_seams(self, window: int | None) -> Any:
         """Return a buffer with factors 1 or 0 that say which sites of a selection lie on which boundary seam.
 
-        None if the selection has no sites at boundary seams.
+        Returns None if the selection has no sites at boundary seams.
         """
         if window is None:
             return None
