@@ -12,12 +12,14 @@ from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
 
-#: Default for the table of values that are known before an evaluation, by the ``id`` of the node: an empty table.
+#: An empty table. It is the default of `Arithmetic.values`: no values are known before the evaluation.
 NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
-    """A kind of arithmetic in which expressions have values of type T; sums are computed by ``+`` and ``-`` of T."""
+    """Base class of the kinds of arithmetic. Expressions are evaluated to values of type T, which has ``+`` and
+    ``-``.
+    """
 
     def constant(self, value: Fraction) -> T:
         """Return the value of a rational number."""
@@ -36,8 +38,11 @@ class Arithmetic(Generic[T]):
         raise NotImplementedError
 
     def function(self, name: str, args: list[T]) -> T:
-        """Return the value of a function of `phigen.symbolic.functions.FUNCTIONS`; ``pi`` and ``E`` have no
-        arguments."""
+        """Return the value of the function ``name`` at the arguments ``args``.
+
+        The names are those of `phigen.symbolic.functions.FUNCTIONS`. The constants ``pi`` and ``E`` count as functions
+        without arguments.
+        """
         raise NotImplementedError
 
     def visit(self, node: Expression, args: list[Any]) -> T:

@@ -9,11 +9,11 @@ from fractions import Fraction
 def economised(
     coefficients: Sequence[Fraction], radius: Fraction, terms: int, *, symmetric: bool = False
 ) -> list[Fraction]:
-    """Return ``terms`` coefficients whose power series approximates Σ c_k z^k.
+    """Return the coefficients of a power series with ``terms`` terms that approximates Σ c_k z^k.
 
     The approximation holds for 0 ≤ z ≤ radius or, if ``symmetric``, for −radius ≤ z ≤ radius. The method is that of C.
-    Lanczos, Applied Analysis, 1956: subtracting a multiple of the Chebyshev polynomial of the highest degree removes
-    the highest power with the smallest change of the sum. This is repeated until ``terms`` coefficients are left.
+    Lanczos, Applied Analysis, 1956. Each step subtracts the multiple of a Chebyshev polynomial that removes the highest
+    power. No other way to remove this power changes the sum less.
     """
     scaled = [c * radius**k for k, c in enumerate(coefficients)]
     while len(scaled) > terms:
@@ -24,9 +24,10 @@ def economised(
 
 
 def _chebyshev(degree: int, twice: Sequence[int]) -> list[int]:
-    """Return the coefficients of the Chebyshev polynomial T_n(y) as a polynomial in u; n is the ``degree``.
+    """Return the coefficients of a Chebyshev polynomial T_n(y), written as a polynomial in u, where n is the
+    ``degree``.
 
-    y is a linear function of u: 2y = ``twice[0]`` + ``twice[1]`` u.
+    The variables are related by 2y = ``twice[0]`` + ``twice[1]`` u.
     """
     previous, last = [1], [twice[0] // 2, twice[1] // 2]
     if degree == 0:

@@ -1,14 +1,15 @@
-"""Jacobi's elliptic functions for the free rigid body, in terms of one real number: the tangent of a quarter of the
-amplitude.
+"""Jacobi's elliptic functions for the free rigid body. All follow from one real number, κ = tan(φ/4)/√P.
 
-For P ≥ Q ≥ 0 let φ be the amplitude, φ(0) = 0 with φ̇² = P − Q sin²φ. Then S = sin(φ)/√P, C = cos φ and D = √(1 − QS²)
-are sn, cn and dn of √P t with the modulus √(Q/P) (sn divided by √P), and Ṡ = CD. With κ = tan(φ/4)/√P and z = Pκ²,
+For P ≥ Q ≥ 0 the amplitude φ is the increasing solution of φ̇² = P − Q sin²φ with φ(0) = 0. Let S = sin(φ)/√P, C = cos φ
+and D = √(1 − QS²). For the argument √P t and the modulus √(Q/P), these are sn/√P, cn and dn; moreover Ṡ = CD. With
+κ = tan(φ/4)/√P and z = Pκ²,
 
     S = 4κ(1 − z)/(1 + z)²,    C = (1 − 6z + z²)/(1 + z)²,    D² = C² + (P − Q)S².
 
-`AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q, for φ modulo full turns, so that |κ|√P ≤ 1. The argument is
-R, not Q, because near a separatrix R is small, and the difference P − Q would lose digits. The derivatives of κ contain
-the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 0 to t, but no division by P, Q or R:
+`AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q. Full turns are subtracted from φ, so that |κ|√P ≤ 1. The
+argument is R rather than Q because R is small near a separatrix, where the difference P − Q would lose digits. The
+derivatives of κ contain the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 0 to t. They contain
+no division by P, Q or R:
 
     ∂κ/∂t = (1 + z)D/4,  ∂κ/∂R = (1 + z)DI/8,  ∂κ/∂P = (1 + z)DG/8 − κ³(5 − 2z + z²)/(1 + z)³.
 
@@ -16,9 +17,9 @@ the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 
 
 If Pt² ≤ 1, generated code computes S at t/16 by a power series, and doubles the argument four times. Otherwise it
 computes φ by the arithmetic–geometric mean of √P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical
-Functions, 16.4 and 17.6); there, arcsin is written as an arctangent, so that there is no cancellation. The integrals
-are Carlson's R_D and R_J, by duplication (B. C. Carlson, Numerical computation of real or complex elliptic integrals,
-Numerical Algorithms 10, 1995).
+Functions, 16.4 and 17.6). The arcsines of this method are written as arctangents, so that there is no cancellation. The
+integrals are computed from Carlson's R_D and R_J, by duplication (B. C. Carlson, Numerical computation of real or
+complex elliptic integrals, Numerical Algorithms 10, 1995).
 """
 
 from __future__ import annotations
@@ -29,33 +30,36 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: Names, in expressions, of the functions κ, G and I of t, P and R that the text at the head of the module defines.
+#: Names, in expressions, of the functions κ, G and I, whose arguments are t, P and R. The text at the head of the
+#: module defines them.
 AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2")
 
 #: Name, in expressions, of the elliptic integral of the third kind; its arguments are t, P, R and n. The text at the
 #: head of the module defines it.
 THIRD = "amplitude3"
 
-#: For Pt² ≤ 1: number of times that the argument of S is halved for the power series and doubled afterwards, and number
-#: of terms of the series. At t/16 the omitted terms are below 10⁻¹⁸.
+#: For Pt² ≤ 1, the power series of S is evaluated at t/2^DOUBLINGS, with TERMS terms, and the argument is then doubled
+#: DOUBLINGS times. At t/16 the omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
-#: The iteration a, b → (a + b)/2, √(ab) of the arithmetic–geometric mean ends when c/a, with c = (a − b)/2, is at most
-#: this. One more iteration would change c/a to (c/a)²/4, which is below rounding.
+#: The arithmetic–geometric mean is the limit of the iteration a, b → (a + b)/2, √(ab). Let c = (a − b)/2. The iteration
+#: ends when c/a is at most MEAN_RATIO. One more iteration would change c/a to (c/a)²/4, which is below rounding.
 MEAN_RATIO = 1e-8
 
-#: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments of R_D there differ
-#: by at most 0.71, so that this number suffices for double precision.
+#: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments with which SIMD code
+#: calls R_D differ by at most 0.71. For such arguments five steps give double precision.
 LANE_DUPLICATIONS = 5
 
 
 @cache
 def series() -> tuple[tuple[Fraction, ...], ...]:
-    """Return the coefficients c[j][i] of S/t = Σ c[j][i] xⁱ yʲ, where x = (P + Q)t² and y = PQt⁴.
+    """Return the coefficients c[j][i] of the power series S/t = Σ c[j][i] xⁱ yʲ, where x = (P + Q)t² and y =
+    PQt⁴.
 
-    They follow from the differential equation S̈ = −(P + Q)S + 2PQS³.
+    S is the function of t that the text at the head of the module defines. The coefficients follow from its
+    differential equation S̈ = −(P + Q)S + 2PQS³.
     """
-    terms = [{(0, 0): Fraction(1)}]  # for t⁰, t², … in S/t: the coefficients by the exponents (i, j) of x and y
+    terms = [{(0, 0): Fraction(1)}]  # entry n: the terms of S/t with t²ⁿ, as {(i, j): c[j][i]}
     for n in range(TERMS - 1):
         following: dict[tuple[int, int], Fraction] = {}
         divisor = (2 * n + 2) * (2 * n + 3)
@@ -92,9 +96,9 @@ def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
 
 
 def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tuple[Any, ...]:
-    """Return the partial derivatives with respect to t, P and R of κ, the function `value`.
+    """Return the partial derivatives of κ, the result of `value`, with respect to t, P and R.
 
-    ``call`` applies a function by its name.
+    ``kappa`` is κ itself. ``call`` applies a function by its name.
     """
     z = p * kappa**2
     *_, square = functions_of(kappa, p, r)
@@ -158,7 +162,7 @@ def _amplitude(library: Any, u: Any, k: Any) -> Any:
 
 
 def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, Any, Any], Any]) -> Any:
-    """Return an integral from 0 to t whose integrand is S² times a function of S², by a formula of Carlson.
+    """Return the integral, from 0 to t, of S² times a function of S², by a formula of Carlson.
 
     The integral is S³/3 times an elliptic integral of Carlson, which ``carlson_of`` computes from C², D² and S².
     """
@@ -196,10 +200,10 @@ def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
 
 
 def _third_series(a: Any, b: Any, c: Any) -> Any:
-    """Return R_J · mean^(3/2) by a power series, for an integral R_J of Carlson whose arguments are close to their
-    mean.
+    """Return R_J(x, y, z, w) · mean^(3/2) by a power series, where mean = (x + y + z + 2w)/5 is close to all
+    arguments.
 
-    ``a``, ``b`` and ``c`` are the relative differences of the mean from the first three arguments of R_J.
+    ``a``, ``b`` and ``c`` are the relative differences (mean − x)/mean, (mean − y)/mean and (mean − z)/mean.
     """
     d = -(a + b + c) / 2
     product, dd = a * b * c, d * d

@@ -1,7 +1,7 @@
 """Entire functions in which exact flows are written, so that no formula divides by a frequency that may be 0.
 
-- ``cosroot``(s) = cos √s, ``sinroot``(s) = sin(√s)/√s, for s < 0 with cosh and sinh. So one formula holds for rotations
-  and for hyperbolic motions. The functions satisfy cosroot² + s·sinroot² = 1
+- ``cosroot``(s) = cos √s and ``sinroot``(s) = sin(√s)/√s or, for s < 0, cosh √−s and sinh(√−s)/√−s. With these two
+  functions, one formula holds for rotations and for hyperbolic motions. They satisfy cosroot² + s·sinroot² = 1
 - ``arcroot``(s) = (√s − sin √s)/√s³
 - ``exprel``(s) = (e^s − 1)/s
 - ``sinroot1``, ``arcroot1`` and ``exprel1`` are the derivatives of sinroot, arcroot and exprel, for tangent maps
@@ -28,10 +28,10 @@ _HALF = Fraction(1, 2)
 class Entire:
     """An entire function Σ c_n s^n: its power series for |s| ≤ ``radius``, and a closed form for larger |s|.
 
-    ``closed`` has one closed form for s > 0 and one for s < 0, or a single one for both signs. Its arguments are a
-    library of functions (math, an mpmath context, or a printer of formulas), s and √|s|. ``known`` is the form for s >
-    0 in terms of well-known functions. ``slopes`` is the derivative, as in `phigen.symbolic.functions`; None if there
-    is none. ``meaning`` is the comment in generated code.
+    ``closed`` has two closed forms, for s > 0 and for s < 0, or a single one for both signs. A closed form is a
+    function of three arguments: a library of functions (math, an mpmath context, or a printer of formulas), s, and
+    √|s|. ``known`` writes the function in terms of well-known functions, for s > 0. ``slopes`` is the derivative, as in
+    `phigen.symbolic.functions`, or None. ``meaning`` is the comment in generated code.
     """
 
     meaning: str
@@ -113,7 +113,7 @@ ENTIRE: dict[str, Entire] = {
 
 
 class _Library:
-    """A library of functions to which the functions of `ENTIRE` are added, computed by their closed forms."""
+    """A library of functions, extended by the functions of `ENTIRE`. The latter are computed by their closed forms."""
 
     def __init__(self, library: Any) -> None:
         self._library = library

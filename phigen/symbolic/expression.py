@@ -1,8 +1,8 @@
 """Expressions: an immutable, interned directed acyclic graph of real arithmetic.
 
 All formulas in phigen are expressions: the parser makes them, the geometry differentiates them, the scheme assembles
-the one-step map from them, and the targets print them. Equal formulas built in the same way are the same object, so a
-shared sub-expression is stored, differentiated and printed once.
+the one-step map from them, and the targets print them. Two formulas that are built in the same way are the same object,
+so a shared sub-expression is stored, differentiated and printed once.
 
 Node kinds (``op``):
 
@@ -40,8 +40,8 @@ from phigen.symbolic.functions import FUNCTIONS
 
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
-#: A walk over an expression with at least this number of nodes reports progress, because it takes a tenth of a second
-#: or more.
+#: An expression with this number of nodes is large: a walk over it takes a tenth of a second or more, and reports
+#: progress.
 MANY = 10_000
 
 Number = int | Fraction
@@ -178,7 +178,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """Return a node without simplification, for passes that have already chosen the form that the code shall have."""
+    """Return a node without simplification. It is used by passes that choose the form of the code themselves."""
     return _node(op, args, value)
 
 
@@ -299,7 +299,9 @@ def mul(a: Expression, b: Expression) -> Expression:
 
 
 def power(base: Expression, exponent: Expression | Number) -> Expression:
-    """Return base ** exponent, simplified. An exponent that is not a rational number results in a call of ``power``."""
+    """Return base ** exponent, simplified. If the exponent is not a rational number, the result calls the function
+    ``power``.
+    """
     if isinstance(exponent, Expression):
         if not exponent.is_number:
             return call("power", base, exponent)
@@ -334,7 +336,10 @@ def sqrt(a: Expression) -> Expression:
 
 
 def call(function: str, *args: Expression) -> Expression:
-    """Return function(args) for a name in `FUNCTIONS`; rational values at 0 and 1 are computed at once."""
+    """Return the call of the function with this name in `FUNCTIONS`.
+
+    If the value is known to be rational, such as log(1) = 0, the result is this number instead of a call.
+    """
     record = FUNCTIONS[function]
     if record.arity != len(args):
         raise ValueError(f"{function} takes {record.arity} argument(s), not {len(args)}")
@@ -351,15 +356,16 @@ def call(function: str, *args: Expression) -> Expression:
 def total(terms: Iterable[Expression]) -> Expression:
     """Return the sum of the terms as a balanced tree.
 
-    A balanced tree has smaller rounding errors, and allows more parallel instructions, than a chain of additions.
+    Compared with a chain of additions, a balanced tree has smaller rounding errors, and a processor can execute more of
+    its additions in parallel.
     """
     return _balanced(add, list(terms), ZERO)
 
 
 def total_at(terms: Mapping[int, Expression]) -> Expression:
-    """Return the `total` of a list that has these terms at their positions and 0 elsewhere.
+    """Return the `total` of a list, given by its nonzero terms: position in the list → term.
 
-    The terms are added in the order in which `total` would add them, so that the result does not depend on the zeros.
+    The terms are added in the same order as in `total`, so the result is the same as for the list with its zeros.
     """
     items = dict(sorted(terms.items()))
     while len(items) > 1 or any(items):
@@ -391,7 +397,7 @@ def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> l
     """Return the roots and all nodes below them; the arguments of a node come before the node.
 
     The order depends only on the expressions, not on addresses in memory. Nodes whose ``id`` is in ``excluded`` are
-    left out; so are nodes that are arguments of excluded nodes only.
+    left out. A node that occurs only as an argument of excluded nodes is left out too.
     """
     order: list[Expression] = []
     visited: set[Expression] = set()
@@ -459,7 +465,8 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with internal functions of phigen replaced by well-known ones: cosroot(s) by cos √s.
+    """Return the roots with internal functions of phigen replaced by well-known ones, for instance cosroot(s) by cos
+    √s.
 
     If a replacement has two forms, for positive and for negative arguments, the form for positive arguments is used.
     """
@@ -522,9 +529,9 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
 
 
 def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
-    """Return for each root its nonzero partial derivatives, by the name of the symbol.
+    """Return the nonzero partial derivatives of each root, by the name of the symbol.
 
-    The results equal those of `derivatives`; all names are treated in one walk over the expressions.
+    The results equal those of `derivatives`, but one walk over the expressions serves all names.
     """
     variables = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
@@ -577,8 +584,8 @@ _PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
 def text(e: Expression, longest: int = 2000) -> str:
     """Return the expression in the syntax of a spec; parsing the text yields an equal expression.
 
-    The text is for messages: a shared sub-expression is repeated wherever it occurs, and a text of more than
-    ``longest`` characters is cut, with an ellipsis.
+    The text is for messages. Shared sub-expressions are written out at each occurrence. A text of more than ``longest``
+    characters is cut, and ends with an ellipsis.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:

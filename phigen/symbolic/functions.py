@@ -30,19 +30,19 @@ def _everywhere(*arguments: Fraction) -> bool:
 class Function:
     """A function that may occur in expressions.
 
-    ``slopes(call, f, *arguments)`` are the partial derivatives, where f is the value of the function; None if unknown.
-    ``known(call, *arguments)`` expresses the function by well-known functions. ``value(library, *arguments)`` computes
-    it with the functions of the library, `math` or an mpmath context; if it is None, the library must have a function
-    of the same name. ``at_zero`` is the value at 0, None if it is not rational. ``parity`` is even or odd, ``inverse``
-    the name of the inverse function. ``defined`` tests whether the function has a value at rational arguments,
-    ``rational`` says whether the value is then rational. ``cost`` is the time of a call in units of one addition. An
-    ``own`` function is internal: a spec cannot use it.
+    ``slopes(call, f, *arguments)`` returns the partial derivatives, where f is the value of the function; ``slopes`` is
+    None if they are unknown. ``known(call, *arguments)`` expresses the function by well-known functions.
+    ``value(library, *arguments)`` computes the function with those of a library, `math` or an mpmath context; if
+    ``value`` is None, the library must have a function of the same name. ``at_zero`` is the value at 0, or None if it
+    is not rational. ``parity`` is even or odd. ``inverse`` is the name of the inverse function. ``defined`` tests
+    whether the function has a value at rational arguments, and ``rational`` is true if this value is rational.
+    ``cost`` is the time of a call in units of one addition. An ``own`` function is internal: a spec cannot use it.
 
     ``written`` maps a language to the spelling of the function: a name, or a text with ``{0}``, ``{1}`` for the
     arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in C
     loops over SIMD lanes: the name of a vectorised version, or a formula that contains only vectorised functions.
-    ``inline`` says that the code has no call, only arithmetic or an instruction. ``near`` says that for small arguments
-    flows use a version that is a polynomial. ``letters`` is the name in mathematics.
+    ``inline`` is true if the code contains only arithmetic or one instruction, and no call. ``near`` is true if flows
+    replace the function by a polynomial for small arguments. ``letters`` is the name in mathematics.
     """
 
     name: str
@@ -71,7 +71,7 @@ _LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 def _library(name: str, **other_names: str) -> dict[str, str]:
     """Return the table ``written`` for a function that the libraries of all languages have.
 
-    ``other_names`` has the names in languages whose library has another name for it.
+    ``other_names`` maps a language to the name of the function in the library of this language, if it is not ``name``.
     """
     return {language: call.format(other_names.get(language, name)) for language, call in _LIBRARIES.items()}
 
@@ -137,7 +137,7 @@ _LISTED = (
         known=lambda call, a: call("log", 1 + a),
         written=_library("log1p"),
     ),
-    Function(  # 1/a for a > 0, else NaN: a flow with this factor ends where a reaches 0
+    Function(  # 1/a for a > 0, else NaN: if a reaches 0, a flow with this factor has no values from then on
         "inv",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -320,9 +320,9 @@ _LISTED = (
 
 
 def _phi(order: int) -> Function:
-    """Return the record of a derivative of φ (`phigen.symbolic.special`) or, for the order 0, of φ itself.
+    """Return the record of φ (`phigen.symbolic.special`), or of its derivative of this ``order``, 1 or 2.
 
-    The ``cost`` in the record is that for small arguments: a series of nine terms, and a test of the argument.
+    The ``cost`` in the record is the time for small arguments: a series of nine terms, and a test of the argument.
     """
     name, further = SPECIAL[order], SPECIAL[order + 1 : order + 2]
     return Function(
@@ -338,7 +338,10 @@ def _phi(order: int) -> Function:
 
 
 def _entire(name: str) -> Function:
-    """Return the record of a function of `phigen.symbolic.entire`; flows have a version of it for small arguments."""
+    """Return the record of a function of `phigen.symbolic.entire`.
+
+    In flows, calls with small arguments use a polynomial in place of the function.
+    """
     series = ENTIRE[name]
     return Function(
         name,
@@ -352,7 +355,7 @@ def _entire(name: str) -> Function:
     )
 
 
-#: All functions by name, in the order in which files define and list them.
+#: All functions by name. Generated files define and list functions in this order.
 FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
 FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
 FUNCTIONS |= {name: _entire(name) for name in ENTIRE}
@@ -395,7 +398,8 @@ FUNCTIONS |= {
     for k, name in enumerate(names)
 }
 
-#: Powers with the exponents ½ and ⅓, which expressions write as powers, and languages as functions.
+#: The square root and the cube root. Expressions write them as powers with the exponents ½ and ⅓, but languages have
+#: functions for them.
 ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 

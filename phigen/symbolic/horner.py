@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
 Monomial = tuple[int, ...]
-#: A monomial as pairs (index of a variable, exponent) of the variables that it contains. Even in large systems a
-#: monomial contains few variables.
+#: A monomial as pairs (index of a variable, exponent). Only variables that occur in the monomial have a pair; in large
+#: systems these are few.
 Powers = tuple[tuple[int, int], ...]
 
 
@@ -17,15 +17,17 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
     """Return Σ coefficient · Π variables[i]**exponent[i] as a nested expression.
 
     ``terms`` maps the exponents of a monomial to its coefficient. At each level, the variable that occurs in the most
-    terms is factored out of them, with the smallest exponent that it has there. So even polynomials become polynomials
-    in the squares of the variables, and each square is computed once. The result depends on the terms only, not on
-    their order.
+    terms is factored out of these terms, with its smallest exponent in them. A polynomial with even exponents becomes a
+    polynomial in the squares of the variables, and each square is computed once. The result does not depend on the
+    order of the terms.
     """
     return sparse_horner({_powers(m): c for m, c in terms.items()}, variables)
 
 
 def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return the result of `horner` for terms whose monomials are `Powers`, sorted by the index of the variable."""
+    """Return the result of `horner`, for terms whose monomials are `Powers`. The pairs of a monomial are sorted by
+    index.
+    """
     left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO
 
@@ -35,7 +37,7 @@ def _powers(monomial: Monomial) -> Powers:
 
 
 def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return the result of `sparse_horner` for at least one term; all coefficients are nonzero."""
+    """Return the result of `sparse_horner`. There is at least one term, and all coefficients are nonzero."""
     if len(terms) == 1:
         ((monomial, coefficient),) = terms.items()
         return coefficient * _monomial(monomial, variables)
@@ -71,7 +73,7 @@ def _common(terms: Iterable[Powers]) -> dict[int, int]:
 
 
 def _graded(monomial: Powers) -> tuple[int, list[tuple[int, int]]]:
-    """Return a sort key for monomials: by total degree, then by the exponents of the first variable that differs.
+    """Return a sort key for monomials: by total degree, then by the first variable whose exponents differ.
 
     The monomial with the larger exponent of this variable comes first.
     """

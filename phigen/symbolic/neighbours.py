@@ -1,8 +1,9 @@
 """Symbols of values at sites of a lattice, with an offset: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
 
-On a grid the offset consists of nonzero steps along axes, in the order of the axes; ``x`` alone is x at the site
-itself. On lattices without axes the offset is an end, a or b, of a bond or a pair. The text with brackets is the name
-of an ordinary symbol. Names that a spec declares contain no brackets, so that they cannot clash with it.
+On a grid the brackets contain the nonzero steps along the axes, in the order of the axes; ``x`` without brackets is the
+value at the site itself. On lattices without axes the brackets contain an end, a or b, of a bond or a pair. The whole
+text is the name of an ordinary symbol. Names that a spec declares contain no brackets, so no declared name equals such
+a text.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import Symbol
 
-#: Offset of a site from another site. On a grid: steps along the axes. On lattices without axes: ``("a",)`` or
-#: ``("b",)`` for an end of a bond or a pair, ``()`` for the site itself.
+#: Offset of a site from another site. On a grid it consists of the steps along the axes. On lattices without axes it is
+#: ``("a",)`` or ``("b",)``, an end of a bond or a pair, or ``()``, the site itself.
 Offset = tuple[int, ...] | tuple[str, ...]
 #: The name of a field, or of another quantity with a value at every site, and the offset of the site.
 Place = tuple[str, Offset]
@@ -29,7 +30,7 @@ _STEP = re.compile(r"(?P<axis>.+?)(?P<step>[+-][0-9]+)")
 class Neighbours:
     """The symbols of values at sites of a lattice.
 
-    ``names`` are the quantities with a value at every site, ``axes`` the directions of a grid; () without a grid.
+    ``names`` are the quantities with a value at every site. ``axes`` are the axes of a grid, or () for other lattices.
     """
 
     names: tuple[str, ...]
@@ -72,11 +73,13 @@ class Neighbours:
         return base, tuple(offsets.values())
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return those symbols in the expressions that are values at sites, each with its name and its offset."""
+        """Return the symbols in the expressions that are values at sites: symbol → its name and its offset."""
         return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
 
     def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
-        """Return the expressions of one site, written for the site at an offset on a grid: x[i+1] becomes x[i+2]."""
+        """Return the expressions of one site, written for another site of the grid: for the offset 1, x[i+1] becomes
+        x[i+2].
+        """
         if not any(offset):
             return list(expressions)
         shifted_symbols = {

@@ -22,7 +22,9 @@ class DomainError(ArithmeticError):
 
 
 def is_rational(*roots: Expression) -> bool:
-    """Whether the expressions have rational values, where they are defined, for all rational values of the symbols."""
+    """Whether the values of the expressions are rational for all rational values of the symbols. Undefined values do
+    not count.
+    """
     return all(
         node.op in _RATIONAL or (node.op == "pow" and node.value.denominator == 1) for node in topological(roots)
     )

@@ -23,13 +23,14 @@ from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import MOMENTUM, Symbol, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
-#: Default for the largest number of terms of a formula that are displayed; the other terms become an ellipsis.
+#: Largest number of terms of a displayed formula, by default. An ellipsis stands for further terms.
 SHOWN = 8
 
 #: Names of φ and its derivatives in displayed formulas.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
-#: Definitions of the internal functions in which flows are written, displayed below formulas that contain them.
+#: Definitions of internal functions that occur in formulas of flows. A definition is displayed below the formulas that
+#: contain the function.
 UNFAMILIAR = {
     "cosroot": "cosroot(s) = cos √s",
     "sinroot": "sinroot(s) = sin(√s)/√s",
@@ -49,7 +50,7 @@ UNFAMILIAR = {
 #: Largest number of characters of a formula in a message.
 LONGEST = 160
 
-#: Largest number of nodes of a formula that is multiplied out, to see whether the result is shorter.
+#: Formulas with more nodes than this are displayed as they are, without a test whether multiplying out shortens them.
 _LARGE = 400
 
 
@@ -71,7 +72,7 @@ class Formula:
 
     @property
     def size(self) -> int:
-        """Number of terms, those that are not displayed included."""
+        """Number of all terms, including those that are not displayed."""
         return len(self.terms) + self.hidden
 
     def __str__(self) -> str:
@@ -86,7 +87,7 @@ class Formula:
 
 
 def signed_sum(terms: Iterable[tuple[bool, str]]) -> str:
-    """Return the text of a sum. A term is a pair: whether it is negative, and the text of its absolute value."""
+    """Return the text of a sum of ``terms``: pairs of a sign (true if negative) and the text of the absolute value."""
     printed_sum = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
     return printed_sum[3:] if printed_sum.startswith(" + ") else f"-{printed_sum[3:]}"
 
@@ -122,8 +123,8 @@ def readable(
 ) -> list[str]:
     """Return the expressions as text, multiplied out if that is shorter; covectors are written ``p_NAME``.
 
-    Of an expression with more than ``max_terms`` terms, those of the lowest degree in covectors and ``small_symbols``
-    are displayed.
+    If an expression has more than ``max_terms`` terms, only some of its terms are displayed: those of the lowest degree
+    in covectors and ``small_symbols``.
     """
     covectors = (name for name in symbols_of(*expressions) if kind_of(name) == MOMENTUM)
     renamed = with_plain_names(expressions)
@@ -201,9 +202,9 @@ def cut(text: str) -> str:
 def expanded(
     expressions: Sequence[Expression], max_terms: int | None, small_symbols: Collection[str] = ()
 ) -> Iterator[Formula | None]:
-    """Yield for each expression its formula, multiplied out, with common factors of fractions cancelled.
+    """Yield the formula of each expression, multiplied out, with common factors of fractions cancelled.
 
-    None is yielded for an expression that is too large. ``max_terms`` and ``small_symbols`` are those of `readable`.
+    For an expression that is too large, None is yielded. ``max_terms`` and ``small_symbols`` are those of `readable`.
     """
     for e in expressions:
         if len(topological([e])) > _LARGE:

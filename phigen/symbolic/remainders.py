@@ -1,17 +1,18 @@
-"""Exponentials of matrices with at most four rows, by the theorem of Cayley and Hamilton: e^{tA} is 1 + Σ F_k A^k,
-where k < 4.
+"""Exponentials of matrices with at most four rows, by the theorem of Cayley and Hamilton.
 
-If A⁴ = a_0 + a_1 A + a_2 A² + a_3 A³, the remainder of e^{tx} on division by p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0 is
-1 + Σ F_k x^k. `REMAINDERS` are the names of F_0, …, F_3, functions of t, a_0, …, a_3. For matrices with three rows,
-a_0 = 0. The functions are entire: eigenvalues, which may be complex or equal, do not occur. The quotient of the
-division, (e^{tx} − 1 − Σ F_k x^k)/p, has a remainder g = Σ G_k x^k on division by p; `QUOTIENTS` are the names of the
-G_k. The derivatives of the F_k are
+Let A⁴ = a_0 + a_1 A + a_2 A² + a_3 A³ and p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0. Division of e^{tx} by p leaves a
+remainder of degree at most 3, written as 1 + Σ F_k x^k. Then e^{tA} = 1 + Σ F_k A^k. `REMAINDERS` are the names of the
+functions F_0, …, F_3. Their arguments are t, a_0, …, a_3; for matrices with three rows, a_0 = 0. The functions are
+entire, and their formulas contain no eigenvalues, which may be complex or equal. Let g = Σ G_k x^k be the remainder of
+the quotient (e^{tx} − 1 − Σ F_k x^k)/p on a further division by p. `QUOTIENTS` are the names of the G_k.
+
+The derivatives of the F_k are
 
     ∂F_k/∂t = F_{k−1} + a_k F_3 (for k = 1, F_0 + 1 replaces F_0; F_{−1} = 0),   Σ_k (∂F_k/∂a_j) x^k = x^j g mod p.
 
-For the computation, t is halved n times, u = t/2ⁿ, until p has only small roots as a polynomial in y = ux. The
-remainders of the powers of y satisfy a recurrence, and summing them gives the remainder of e^y. Then n squarings modulo
-p lead from u to t: if 1 + F is the remainder for u, the remainder for 2u is (1 + F)² = 1 + 2F + F².
+The computation first replaces t by u = t/2ⁿ, where n is so large that p, as a polynomial in y = ux, has only small
+roots. A recurrence gives the remainders of the powers of y, and hence the remainder of e^y. Then n squarings modulo p
+lead back to t: if 1 + F is the remainder for u, the remainder for 2u is (1 + F)² = 1 + 2F + F² modulo p.
 """
 
 from __future__ import annotations
@@ -20,28 +21,29 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Names, in expressions, of F_0, …, F_3, functions of t, a_0, …, a_3. Below, names of G_0, …, G_3, with the same
-#: arguments.
+#: Names, in expressions, of the functions F_0, …, F_3 and G_0, …, G_3. Their arguments are t, a_0, …, a_3.
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 
-#: MAX_ROOT: halving t ends when a bound for the roots of p is at most this. TERMS: number of terms of the series of e^y
-#: that are then summed; the omitted terms are below 10⁻¹⁷.
+#: Halving of t ends when a bound for the roots of p is at most MAX_ROOT. Then TERMS terms of the series of e^y are
+#: summed; the omitted terms are below 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
-#: Number of halvings and doublings in SIMD code, which has no branches. Two of them allow roots up to 4 `MAX_ROOT`.
+#: Number of halvings of t, and of squarings, in SIMD code, which has no branches. Two halvings suffice for roots up to
+#: 4 `MAX_ROOT`.
 LANE_DOUBLINGS = 2
 
 
 def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
-    """Return the function that computes the partial derivatives of F_k (see `value`) by t, a_0, …, a_3.
+    """Return the function that computes the partial derivatives of F_k (see `value`) with respect to t, a_0, …,
+    a_3.
 
     Its first argument, ``call``, applies a function by its name.
     """
 
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
         last = call(REMAINDERS[3], t, *a)
-        # whether F_{k−1} = 0: F_{−1} is 0, and F_0 is 0 if a_0 is 0
+        # Whether F_{k−1} = 0: this holds for F_{−1}, and if a_0 = 0 also for F_0.
         vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))
         previous = 0 if vanishing else call(REMAINDERS[k - 1], t, *a)
         slope = (previous + 1 if k == 1 else previous) + a[k] * last
@@ -58,7 +60,7 @@ def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
 def times_x(coefficients: Any, a: Any) -> list[Any]:
     """Return the product of x and a polynomial of degree 3, modulo p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0.
 
-    Lists of coefficients begin with the constant.
+    The constant coefficient is the first one in the argument and in the result.
     """
     *lower, top = coefficients
     return [c * top + e for c, e in zip(a, [0, *lower], strict=True)]
@@ -73,10 +75,10 @@ def value(k: int, library: Any, t: Any, *a: Any) -> Any:
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return G_k, where Σ G_k x^k is the remainder of a second division by the polynomial.
+    """Return G_k: Σ G_k x^k is the remainder of the quotient (e^{tx} − 1 − Σ F_k x^k)/p on division by p.
 
-    The first division, in `value`, has a quotient; the second division divides this quotient by the same polynomial.
-    The precision is double if the library is `math`, else that of an mpmath context.
+    Here p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0, and F_k is the result of `value`. The precision is double if the
+    library is `math`, else that of an mpmath context.
     """
     return _coefficients(library, t, a)[1][k]
 

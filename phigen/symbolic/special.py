@@ -1,11 +1,11 @@
 """The function φ of the exponential bi-realisation, and its first two derivatives.
 
-φ(s) = (1 − w cot w)/s with w = √s/2, analytic at s = 0 and for s < 0 (where cot becomes coth), with poles at s = 4π²n².
-It is defined by the even part of z/(1 − e^{−z}): (z/2) coth(z/2) = 1 + z² φ(−z²).
+φ(s) = (1 − w cot w)/s with w = √s/2. The function is analytic at s = 0 and for s < 0, where cot becomes coth. Its poles
+are s = 4π²n² for n ≥ 1. It occurs in the even part of z/(1 − e^{−z}), which is (z/2) coth(z/2) = 1 + z² φ(−z²).
 
 - φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
 - sφ' = 1/8 − (3/2)φ + ½sφ² (Riccati), hence (n + 3/2) a_n = ½ Σ_{i+j=n−1} a_i a_j, a_0 = 1/12
-- φ(s) = Σ_{n≥1} 2/(4π²n² − s): without its nearest pole the series converges for |s| < 16π²
+- φ(s) = Σ_{n≥1} 2/(4π²n² − s): after subtraction of the term n = 1, the power series converges for |s| < 16π²
 
 The names of φ and its derivatives as functions of expressions are ``phi0``, ``phi1``, ``phi2``.
 """
@@ -20,13 +20,13 @@ from typing import Any
 #: Names, in expressions, of φ, φ' and φ''. Higher derivatives are not available.
 SPECIAL = ("phi0", "phi1", "phi2")
 
-#: Bounds of |s| between three methods. Below NEAR, φ is a power series; from NEAR to MIDDLE, its nearest pole plus a
-#: power series; from MIDDLE on, the closed form.
+#: Bounds of |s| between three ways to compute φ. For |s| < NEAR it is the sum of a power series. For NEAR ≤ |s| <
+#: MIDDLE it is the pole nearest to 0 plus a power series. For larger |s| the closed form is used.
 NEAR, MIDDLE = 0.25, 16.0
 NEAR_TERMS, MIDDLE_TERMS = 9, 21
 POLE = 4 * math.pi**2
 
-#: Largest |s| for which SIMD code, which has no branches, uses the power series, and number of its terms there.
+#: SIMD code, which has no branches, uses a power series with LANE_TERMS terms. It is valid for |s| ≤ LANE_REACH.
 LANE_REACH, LANE_TERMS = 4.0, 17
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)
@@ -45,31 +45,38 @@ def order_of(name: str) -> int:
 
 
 def coefficient(order: int, n: int) -> Fraction:
-    """Return the exact coefficient of sⁿ in the Taylor series of φ or its derivative of this ``order``.
+    """Return the exact coefficient of sⁿ in the Taylor series of the derivative of φ of this ``order``.
 
-    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation.
+    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation. For the order
+    0 the derivative is φ itself.
     """
     return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
 
 
 def near_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) for |s| < `NEAR`, the constant first."""
+    """Return the Taylor coefficients of a derivative of φ (see `coefficient`), as many as |s| < `NEAR` needs.
+
+    The constant coefficient is the first one.
+    """
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
 
 
 def lane_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) for SIMD code, the constant first.
+    """Return the Taylor coefficients of a derivative of φ (see `coefficient`), as many as |s| ≤ `LANE_REACH`
+    needs.
 
-    They suffice for |s| ≤ `LANE_REACH`.
+    SIMD code uses them. The constant coefficient is the first one.
     """
     return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) without its nearest pole, constant first.
+    """Return the Taylor coefficients of φ^(order)(s) − 2·order!/(4π² − s)^{order+1}, as many as |s| < `MIDDLE`
+    needs.
 
-    The function is φ^(order)(s) − 2·order!/(4π² − s)^{order+1}; the coefficients suffice for |s| < `MIDDLE`.
+    This function is the derivative of φ (see `coefficient`) without its pole nearest to 0. The constant coefficient is
+    the first one.
     """
     differences = []
     for n in range(MIDDLE_TERMS):
@@ -90,7 +97,9 @@ def in_double(order: int, s: float) -> float:
 
 
 def precisely(context: Any, order: int, s: Any) -> Any:
-    """Return the derivative of φ (see `coefficient`) of this order in an mpmath context; two digits may be wrong."""
+    """Return the derivative of φ (see `coefficient`) of this order in an mpmath context. The last two digits may be
+    wrong.
+    """
     if abs(s) < 1:
         terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
         value = context.zero
@@ -111,7 +120,8 @@ def value(library: Any, order: int, s: Any) -> Any:
 
 
 def _closed(order: int, s: Any, c: Any) -> Any:
-    """Return φ(s) = (1 − c)/s or a derivative of φ, from c = w cot w, w = √s/2; for s < 0, c = w coth w, w = √−s/2.
+    """Return φ(s) = (1 − c)/s or a derivative of φ, where c is w cot w with w = √s/2 or, for s < 0, w coth w with w =
+    √−s/2.
 
     The derivatives follow from the Riccati equation sφ' = 1/8 − (3/2)φ + ½sφ².
     """

@@ -8,16 +8,16 @@ from typing import Any
 #: Symbols of one kind differ by a key, such as the name of a coordinate.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
-#: Kind of the entries of exp(tA) − 1 for a constant matrix A. The key is a digest of A, and the index of the entry in
-#: the list of all entries, row by row.
+#: Kind of the symbols for the entries of exp(tA) − 1 with a constant matrix A. The key has two parts: a digest of A,
+#: and the index of the entry in the list of all entries, row by row.
 EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
-#: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site, which is a part of the gradient. The
-#: other kinds have the value 1 or 0. PRESENT: 1 if no site that a term reads lies beyond an open end. CHOSEN: 1 if a
-#: site of a graph has the colour whose flow is applied. BEGINS: weight, in the equation of motion of a site, of the
-#: terms of H that are written at a neighbour and read the site. It is 1 if these terms belong to the part of H whose
-#: flow is applied. The key of the symbol is the colour of that part and the offset of the neighbour. The weight depends
-#: on the position of the sites relative to boundary seams.
+#: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site; the sum is a part of the gradient.
+#: The symbols of the other kinds have the value 1 or 0. PRESENT: 0 if a term reads a site beyond an open end, else 1.
+#: CHOSEN: 1 if a site of a graph has the colour whose flow is applied. BEGINS: weight of some terms in the equation of
+#: motion of a site, namely the terms of H that are written at a neighbour and read the site. The weight is 1 if these
+#: terms belong to the part of H whose flow is applied. The key is the colour of that part and the offset of the
+#: neighbour. The weight depends on the position of the sites relative to boundary seams.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
 #: Kinds of inputs of transposed functions of lattices. AROUND: cotangent of the change of a field at a neighbour; the
 #: key is the number of the field and the offset. HERE and THERE: cotangents of a sum over bonds or pairs, at the site
@@ -46,11 +46,11 @@ class Symbol(str):
         return (self.kind, *self.key)
 
 
-#: Symbols. STEP: size of a step, or duration of a flow. ELAPSED: time of an exact solution. MATRIX: the matrix Σ p_i
-#: E_i that belongs to momenta p_i, for the basis E_i of a matrix Lie algebra.
+#: STEP: size of a step, or duration of a flow. ELAPSED: time in a formula of an exact solution. MATRIX: the matrix Σ
+#: p_i E_i, where the E_i are the basis of a matrix Lie algebra and the p_i are momenta.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
-#: Kind of the increment of a Wiener process in a step; the key is the number of the source of noise.
+#: Kind of the symbols for the increments of Wiener processes in a step. The key is the number of the source of noise.
 INCREMENT = "dw"
 
 #: Symbol of the energy level e = −H(x₀), a constant in the equations of systems with a monitor.

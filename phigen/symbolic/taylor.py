@@ -1,8 +1,8 @@
 """Truncated power series in t of an expression whose symbols are power series in t.
 
 A `Taylor` contains the series of every node of the expression. The coefficients are elements of a ring: polynomials (a
-`Tower`), or expressions (`ExpressionRing`). The coefficients of tⁱ, *level* i, are computed for all nodes before those
-of level i + 1. So the coefficient of a symbol at level i may depend on results at level i − 1, as in the
+`Tower`), or expressions (`ExpressionRing`). *Level* i consists of the coefficients of tⁱ of all nodes. Level i is
+computed before level i + 1. So the coefficient of a symbol at level i may depend on results at level i − 1, as in the
 Hamilton–Jacobi recursion.
 """
 
@@ -97,9 +97,11 @@ class ExpressionRing(Arithmetic[Expression]):
 
 
 def closure(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the nodes of the expressions, and of the partial derivatives that the series of functions need.
+    """Return all nodes whose series are needed for the series of the expressions. Arguments come before the nodes that
+    use them.
 
-    Arguments come before the nodes that use them. The series of f(a) is computed from that of f'(a).
+    They are the nodes of the expressions and, since the series of f(a) is computed from that of f'(a), the nodes of the
+    partial derivatives of functions.
     """
     closed = list(roots)
     while True:
@@ -116,10 +118,11 @@ def _by_derivative(e: Expression) -> bool:
 
 
 class Taylor:
-    """Power series in t of the nodes of some expressions; ``series[id(node)]`` has the coefficients computed so far.
+    """Power series in t of the nodes of some expressions; ``series[id(node)]`` has the coefficients computed so
+    far.
 
-    The symbols ``variable_symbols`` are series, other symbols are constants. Raises `OverflowError` if one coefficient,
-    or all coefficients together, need too much memory.
+    The symbols ``variable_symbols`` are power series; all other symbols are constants. The constructor and `advance`
+    raise `OverflowError` if one coefficient, or all coefficients together, need too much memory.
     """
 
     def __init__(self, roots: Sequence[Expression], ring: RingOperations, variable_symbols: Sequence[str]) -> None:
@@ -136,15 +139,15 @@ class Taylor:
         return self.series[id(e)]
 
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
-        """Compute the next level, one more coefficient of the series of every node.
+        """Compute one more coefficient of the series of every node (the next level).
 
-        ``inputs`` has the coefficients at this level of the symbols that are series. ``running`` counts the nodes, for
-        the progress display.
+        ``inputs`` maps each of the ``variable_symbols`` to its coefficient at this level. ``running`` is a stage of the
+        progress display, which counts the nodes.
         """
         for count, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]
             coefficients.append(self._coefficient(e, len(coefficients), inputs))
-            if e.op in ("add", "sub", "neg"):  # the memory of products was counted when they were computed
+            if e.op in ("add", "sub", "neg"):  # the memory of products is counted by `_product`
                 self._count(coefficients[-1])
             if running:
                 running.done = count
@@ -209,7 +212,8 @@ class Taylor:
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        # The reciprocal of a constant base is not computed, because the ring need not contain it.
+        # If there are no terms, the base is constant. Its reciprocal is then not computed, because the ring may lack
+        # it.
         return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:
@@ -226,7 +230,8 @@ class Taylor:
     def _function(self, e: Expression, args: list[list[Any]], i: int) -> Any:
         if i == 0:
             return self.ring.function(e.op, [a[0] for a in args])
-        # The series c = f(a) satisfies c' = Σ ∂f/∂a_k(a) · a_k', where the partial derivatives are nodes too.
+        # The series c = f(a) satisfies c' = Σ ∂f/∂a_k(a) · a_k'. The partial derivatives are nodes too, and have
+        # series.
         zero = self.ring.vanishes
         terms = []
         for partial, a in zip(partials(e), args, strict=True):
@@ -239,11 +244,11 @@ class Taylor:
         return self.ring.combine(terms)
 
     def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
-        """Return the coefficient of tⁱ in f(a) by the power series of f at 0, where f is φ or a derivative of
-        φ.
+        """Return the coefficient of tⁱ in f(a), where f is φ or a derivative of φ, by the power series of f at
+        0.
 
-        φ is the function of the exponential bi-realisation. ``a`` has the coefficients of the argument; `ValueError` is
-        raised if the first one is not 0.
+        φ is the function of the exponential bi-realisation. ``a`` has the coefficients of the argument. Raises
+        `ValueError` if the first coefficient is not 0.
         """
         order = order_of(e.op)
         if i == 0:

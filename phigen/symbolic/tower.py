@@ -38,9 +38,9 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
-#: If an element contains at least MANY_GENERATORS generators, it is evaluated at a point before it is reduced by the
-#: relations, since the reduction takes minutes for seven roots. The value at the point counts as nonzero if it is
-#: larger than the fraction ROUNDING of the sum of the absolute values of its terms.
+#: Reducing an element by the relations takes minutes if it contains seven roots. So an element with at least
+#: MANY_GENERATORS generators is first evaluated at a point. Its value counts as nonzero if it is larger than ROUNDING
+#: times the sum of the absolute values of its terms.
 MANY_GENERATORS, ROUNDING = 5, 1e-9
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
@@ -49,10 +49,11 @@ Poly = Any
 
 @dataclass
 class Generator:
-    """A generator, the value of a function as a variable of the ring. ``derivative`` has its nonzero derivatives.
+    """A generator: the value of a function as a variable of the ring.
 
     ``kind`` is the name of a function, or a constant (``pi``, ``E``), or ``reciprocal`` (1/argument, where the argument
-    is irreducible), or ``root``: argument**(1/degree), or argument**(−1/degree) if ``inverse``.
+    is irreducible), or ``root``: argument**(1/degree), or argument**(−1/degree) if ``inverse``. ``derivative`` maps the
+    name of a symbol to the derivative of the generator, if it is not 0.
     """
 
     name: str
@@ -77,8 +78,8 @@ class _MissingError(Exception):
 class Tower(Arithmetic[Poly]):
     """The ring Q[symbols, generators] that contains the given expressions and their derivatives.
 
-    ``symbols`` are the first variables of the ring; generators are added until ``expressions`` are elements, and until
-    the derivatives of elements with respect to the symbols ``variables`` are elements.
+    The variables of the ring are the ``symbols``, then the generators. Generators are added until the ring contains the
+    ``expressions``, and also the derivatives of its elements with respect to the symbols ``variables``.
 
     Raises `OverflowError` if a polynomial may be larger than memory.
     """
@@ -115,7 +116,7 @@ class Tower(Arithmetic[Poly]):
     def _set_context(self, spare: int = 0) -> None:
         """Make the ring of polynomials in all names, and convert the generators to it.
 
-        ``spare`` variables are reserved for generators that may follow.
+        The ring has ``spare`` further variables, for generators that may follow.
         """
         self._room = max(len(self._index) + spare, 1)
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
@@ -129,7 +130,7 @@ class Tower(Arithmetic[Poly]):
         """Drop the cached values, which are no longer valid after a change of the generators."""
         self._pairs: list[tuple[int, int]] | None = None
         self._below: dict[str, frozenset[str]] = {}
-        self._known: dict[int, Poly] = {}  # values of nodes by their id, which `_kept` protects from being reused
+        self._known: dict[int, Poly] = {}  # values by the id of the node; `_kept` keeps the nodes alive
         self._kept: list[Expression] = []
 
     def constant(self, value: int | Fraction) -> Poly:
@@ -146,7 +147,7 @@ class Tower(Arithmetic[Poly]):
         """The element 0 of the tower."""
         return self.constant(0)
 
-    # -- growing ----------------------------------------------------------------------------------
+    # -- adding generators ----------------------------------------------------------------------------------
 
     def _absorb(self, e: Expression) -> Poly:
         """Return the expression as an element; generators that are missing are added to the ring."""
@@ -161,7 +162,7 @@ class Tower(Arithmetic[Poly]):
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
-        # 1/√q becomes a generator. If 1/q was a generator before, it must become the square of 1/√q, so all elements
+        # The generator 1/√q is added. If 1/q is a generator too, 1/q must become the square of 1/√q. So all elements
         # are converted again.
         is_inverse_root = missing.kind == "root" and missing.inverse
         if is_inverse_root and any(g.kind == "reciprocal" for g in self.generators):
@@ -198,7 +199,7 @@ class Tower(Arithmetic[Poly]):
             (rules,) = sparse_derivatives([self.generators[closed_count].expression], self.variables)
             for v in self.variables:
                 if v in rules:
-                    value = self._absorb(rules[v])  # may add generators, and then replaces the ring by a larger one
+                    value = self._absorb(rules[v])  # this may add generators and replace the ring by a larger one
                     self.generators[closed_count].derivative[v] = value
                     size += len(value) * self.bytes_per_term
                     if size > budgets.PRODUCT_BYTES:
@@ -220,7 +221,8 @@ class Tower(Arithmetic[Poly]):
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
 
     def function(self, name: str, args: list[Poly]) -> Poly:
-        """Return the value of a function at elements, as an element: by a generator of the ring, or simplified.
+        """Return the value of a function at elements, as an element of the ring: a generator, or an expression in
+        generators.
 
         If the ring lacks the generator, `_MissingError` is raised.
         """
@@ -269,7 +271,7 @@ class Tower(Arithmetic[Poly]):
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
             numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
             return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
-        if name == "arcroot":  # by functions of s/4, that is of half the angle √s: formulas of flows contain them too
+        if name == "arcroot":  # by functions of s/4, which formulas of flows contain too
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
@@ -377,7 +379,7 @@ class Tower(Arithmetic[Poly]):
     # -- calculus ---------------------------------------------------------------------------------
 
     def derivative(self, element: Poly, name: str) -> Poly:
-        """Return the total derivative with respect to one of `variables`, on which generators depend too."""
+        """Return the derivative with respect to one of `variables`, including the derivatives of the generators."""
         # Adding 0 makes a copy, so that the memory of terms that were cancelled is freed.
         result = element.derivative(self._index[name]) + 0
         degrees = element.degrees()
@@ -429,7 +431,7 @@ class Tower(Arithmetic[Poly]):
             self._below[g.name] = frozenset({g.name}.union(*map(self.names_in, g.arguments)))
         return self._below[g.name]
 
-    # -- deciding ---------------------------------------------------------------------------------
+    # -- tests for 0 ---------------------------------------------------------------------------------
 
     def is_zero(self, element: Poly) -> bool:
         """Return whether the element is proved to vanish identically.
@@ -441,8 +443,9 @@ class Tower(Arithmetic[Poly]):
         return bool(self.numerator(element) == 0)
 
     def _is_nonzero_at_a_point(self, element: Poly) -> bool:
-        """Whether an element has a nonzero value at a sample point; False if it has fewer than `MANY_GENERATORS`
-        generators.
+        """Whether an element has a nonzero value at a sample point.
+
+        An element with fewer than `MANY_GENERATORS` generators is not evaluated; the result is then False.
         """
         degrees = element.degrees()
         if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
@@ -455,7 +458,9 @@ class Tower(Arithmetic[Poly]):
         return abs(math.fsum(terms)) > ROUNDING * math.fsum(map(abs, terms))
 
     def _values_at_a_point(self) -> list[float]:
-        """Return the values of symbols and generators at one point, in floats; all are NaN if one is not defined."""
+        """Return the values of symbols and generators at one point, as floats. If one value is undefined, all
+        are NaN.
+        """
         if len(self._sampled) != len(self._meanings):
             point = {n: 0.5 + math.modf((k + 1) * (math.sqrt(5) - 1) / 2)[0] for k, n in enumerate(self.symbols)}
             try:
@@ -465,9 +470,8 @@ class Tower(Arithmetic[Poly]):
         return self._sampled
 
     def numerator(self, element: Poly) -> Poly:
-        """Return the product of the element and a function without zeros, reduced by the relations of generators.
-
-        The function removes denominators: the result contains no reciprocals.
+        """Return the element times a function without zeros that removes all reciprocals. The relations of generators
+        are used.
         """
         degrees = element.degrees()
         for g in reversed(self.generators):
@@ -477,13 +481,13 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def simplified(self, element: Poly) -> Poly:
-        """Return the same function with fewer terms, if the relations (r·f = 1, w² = q, sin² + cos² = 1) allow it."""
+        """Return the element in a form with fewer terms, if the relations (r·f = 1, w² = q, sin² + cos² = 1)
+        give one.
+        """
         return self._shortened(element, relations=True)
 
     def reduced(self, element: Poly) -> Poly:
-        """Return the same function with common factors of numerator and denominator cancelled, if this leaves fewer
-        terms.
-        """
+        """Return the element with common factors of numerator and denominator cancelled, if this leaves fewer terms."""
         return self._shortened(self.cancelled(element), relations=False)
 
     def _shortened(self, element: Poly, *, relations: bool) -> Poly:
@@ -506,7 +510,8 @@ class Tower(Arithmetic[Poly]):
         return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
-        """Return the element with lower powers of a generator r = f^(−1/n), or of r = 1/f, for which n is 1.
+        """Return the element with lower powers of the generator ``g``, which is r = f^(−1/n). For the reciprocal r =
+        1/f, n is 1.
 
         The coefficient c of rᵉ is divided by f: c = q·f + remainder. Since rⁿ·f = 1, the term q·f·rᵉ becomes q·rᵉ⁻ⁿ.
         """
@@ -559,7 +564,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        """Return the element Σ parts[k] gᵏ, g = cosroot(s), with cosroot² replaced by 1 − s·sinroot²."""
+        """Return the element Σ parts[k] gᵏ with g = cosroot(s), after replacing g² by 1 − s·sinroot(s)²."""
         generator, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
         square = 1 - g.arguments[0] * sin**2
         return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
@@ -605,7 +610,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _inverse_pairs(self) -> list[tuple[int, int]]:
-        """Return the pairs (i, j) for which the product of the ring variables with the indices i and j is 1."""
+        """Return pairs of indices (i, j) of ring variables: the product of variable i and variable j is 1."""
         if self._pairs is None:
             self._pairs = []
             for g in self.generators:
@@ -626,7 +631,7 @@ class Tower(Arithmetic[Poly]):
 
 
 def _is_arithmetic(e: Expression) -> bool:
-    """Whether a node of an expression is a polynomial in its arguments, so that it needs no generator."""
+    """Whether a node of an expression is a polynomial in its arguments. Such a node needs no generator."""
     if e.op == "pow":
         return bool(e.value > 0 and e.value.denominator == 1)
     return e.op in ("number", "symbol", "add", "sub", "neg", "mul")

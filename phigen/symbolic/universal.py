@@ -16,32 +16,33 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Name of the function s in expressions; its arguments are t, r, η, β, μ and |q × q̇|².
+#: Name of the universal anomaly in expressions. Its arguments are t, r, η, β, μ and |q × q̇|².
 ANOMALY = "anomaly"
 
-#: Largest number of iterations, after which the function has no value. Bisection alone takes 53 for double precision.
+#: Largest number of iterations for the equation of s; if they do not suffice, s has no value. Bisection alone takes 53
+#: iterations for double precision.
 MOST_ITERATIONS = 100
 
-#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. The rounding error of q × q̇ is about
-#: 10⁻¹⁵ of the products in it, and 10⁻³⁰ is its square.
+#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. The relative rounding error of q × q̇
+#: is about 10⁻¹⁵; its square is 10⁻³⁰.
 RADIAL = 1e-30
 
 
 def slopes(
     call: Callable[..., Any], s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any
 ) -> tuple[Any, ...]:
-    """Return the partial derivatives of the universal anomaly s by t, r, η, β, μ and |q × q̇|².
+    """Return the partial derivatives of the universal anomaly s with respect to t, r, η, β, μ and |q × q̇|².
 
-    ``call`` applies a function by its name. The derivative by |q × q̇|² is 0, since this argument only decides whether
-    s has a value.
+    ``call`` applies a function by its name. The derivative with respect to |q × q̇|² is 0, since this argument only
+    decides whether s has a value.
     """
     square = s**2
     z = beta * square
     half_sine, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
     g1, g2, g3 = s * call("sinroot", z), square * half_sine**2 / 2, square * s * call("arcroot", z)
     inverse = 1 / (r * call("cosroot", z) + eta * g1 + mu * g2)
-    # s·along_t is the derivative of the left-hand side of the equation by z = βs², at constant s. In G2, the derivative
-    # of sinroot(z/4)²/2 by z is sinroot(z/4) sinroot1(z/4)/4.
+    # s·along_t is the derivative, with respect to z = βs² at constant s, of the left-hand side of the equation at the
+    # head of the module. The derivative of sinroot(z/4)²/2, a factor of G2, is sinroot(z/4) sinroot1(z/4)/4.
     along_t = r * call("sinroot1", z) + eta * s * (half_sine * slope / 4) + mu * square * call("arcroot1", z)
     return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along_t * inverse), -(g3 * inverse), 0
 
@@ -65,9 +66,10 @@ def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any)
 
 
 def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """Return the universal anomaly s for t > 0, the solution of the equation at the head of the module.
+    """Return the universal anomaly s for t > 0: the solution of the equation at the head of the module.
 
-    The iteration is Laguerre's method. Steps that leave the known bounds of the solution are replaced by bisection.
+    The iteration is Laguerre's method. If a step leaves the interval that is known to contain the solution, bisection
+    replaces it.
     """
     rounding = 2.3e-16 if library is math else library.eps
     low, high, s = 0 * t, None, _guess(library, t, r, eta, beta, mu)
@@ -91,9 +93,9 @@ def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any
 def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
     """Return an initial value for the iteration that computes the universal anomaly s after the time t.
 
-    For a small part of an orbit it is a power series in t, or its first term t/r. For a larger part of an elliptic
-    orbit it is βt/μ, since s grows by β/μ per unit of time on average; for a hyperbolic orbit it is 1/√−β, which the
-    iteration doubles as long as it is too small.
+    For a small part of an orbit the initial value is a power series in t, or the first term t/r of the series. For a
+    larger part of an elliptic orbit it is βt/μ, since the average rate of s is β/μ. For a larger part of a hyperbolic
+    orbit it is 1/√−β; the iteration doubles s as long as s is too small.
     """
     u = t / r
     if abs(beta) * u**2 > 1:
@@ -126,9 +128,10 @@ def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any
 
 
 def _collides(library: Any, s: Any, r: Any, eta: Any, beta: Any) -> bool:
-    """Whether a radial motion reaches r = 0 before s.
+    """Whether a radial motion reaches r = 0 before its universal anomaly is s.
 
-    Along a radial motion, the second derivative of √r by s is −(β/4)√r, so that √r is known in closed form.
+    Along a radial motion, the second derivative of √r with respect to the anomaly is −(β/4)√r. So √r is known in closed
+    form.
     """
     from phigen.symbolic import entire
 

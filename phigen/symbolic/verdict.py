@@ -19,11 +19,11 @@ UNDECIDED = "undecided"
 
 POINTS = 8
 DIGITS = 60
-#: A value counts as zero if it is below 10**-ZERO_DIGITS times the largest intermediate result. It is computed with
-#: `DIGITS` digits, 20 more.
+#: A value counts as zero if it is below 10**-ZERO_DIGITS times the largest intermediate result. Values are computed
+#: with `DIGITS` digits, which are 20 more than ZERO_DIGITS.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
-#: Largest number of failing parts that a refutation lists, which bounds its memory for systems of high dimension.
+#: Largest number of failing parts in a refuted statement. It bounds the memory for systems of high dimension.
 MOST_LISTED = 1000
 
 
@@ -31,11 +31,12 @@ MOST_LISTED = 1000
 class Statement:
     """A statement with its verdict.
 
-    ``verdict`` is one of four: ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted``
-    (``residual`` should be zero and is not), ``checked numerically`` (``detail`` says at how many points and to which
-    tolerance), or ``undecided`` (there is no proof, and no point where all functions are defined was found).
-    ``failing`` lists pairs (label, residual) of the parts of a refuted statement that do not reduce to 0, such as the
-    triples of coordinates in the Jacobi identity.
+    ``verdict`` is one of four. ``proved``: in exact arithmetic, for all values of the symbols. ``refuted``:
+    ``residual`` should be zero and is not. ``checked numerically``: ``detail`` gives the number of points and the
+    tolerance. ``undecided``: phigen found no proof, and no point where all functions are defined.
+
+    A refuted statement may have several parts, such as one for each triple of coordinates in the Jacobi identity.
+    ``failing`` lists the parts that do not reduce to 0, as pairs (label, residual).
     """
 
     name: str
@@ -82,7 +83,7 @@ def decide_elements(
 ) -> Statement:
     """Decide whether elements of the ring ``tower`` are 0; return the statement ``name`` with its verdict.
 
-    The arguments have the meaning that they have in `decide_zero`.
+    The other arguments are those of `decide_zero`.
     """
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
@@ -100,8 +101,8 @@ def _at_points(
 ) -> Statement:
     """Return the statement ``name``, decided by the values of its residuals (``pending``) at sample points.
 
-    A nonzero value at one point refutes the statement. Otherwise it is checked numerically, or undecided if there is a
-    residual that could not be evaluated at any point. ``describe(k)`` returns residual number k as text.
+    A nonzero value at one point refutes the statement. If some residual has no value at any point, the statement is
+    undecided. Otherwise it is checked numerically. ``describe(k)`` returns residual number k as text.
     """
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
@@ -141,7 +142,8 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
 
 
 def refutation(point: Mapping[str, str], number: int, value: str) -> str:
-    """Return a point and the value there as text, ``at x=11/7: -8.5``; a long point is replaced by its ``number``.
+    """Return a point and the value at this point as text: ``at x=11/7: -8.5``. A long point is replaced by its
+    ``number``.
 
     For an expression without symbols the text is ``everywhere -2``.
     """
@@ -161,9 +163,10 @@ def _value(expression: Expression, point: dict[str, Fraction]) -> str:
 
 
 def sample_point(names: Sequence[str], positive: Collection[str], index: int) -> dict[str, Fraction]:
-    """Return the point number ``index`` of a fixed sequence of rational points, with magnitudes between 1/5 and 3.
+    """Return a rational point: number ``index`` of a fixed sequence. Its coordinates have magnitudes between
+    1/5 and 3.
 
-    Components may be negative if the index is odd and the name is not in ``positive``. The sequence depends on the
+    A coordinate may be negative if the index is odd and the name is not in ``positive``. The sequence depends on the
     names only. Covectors (``p:NAME``) are 32 times smaller, since bi-realisations are defined near p = 0.
     """
     state = 88172645463325252 + 7919 * (index + 1)
