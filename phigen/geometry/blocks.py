@@ -1,5 +1,7 @@
-"""Blocks of π: groups of coordinates that have no brackets with other groups, such as the coordinates of one of several
-bodies."""
+"""Blocks of π: groups of coordinates such that all brackets between two groups are 0.
+
+For instance, the coordinates of each body of a system of bodies may form a block.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from phigen.symbolic.expression import symbols_of
 
 
 def blocks(coordinates: Sequence[str], poisson: Matrix) -> list[list[int]]:
-    """Return the finest partition of the coordinates into blocks, as sorted lists of indices from 0.
+    """Return the finest partition of the coordinates into blocks. A block is a sorted list of indices from 0.
 
     Coordinates of different blocks commute, and brackets within a block depend on coordinates of this block only. A
     coordinate that commutes with all others and occurs in no bracket is a block by itself.

@@ -41,10 +41,10 @@ def found_casimirs(
     declared: Mapping[str, Expression],
     used_names: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
-    """Return Casimirs that are independent of the declared ones, by the unused names C1, C2, …, and notes for the user.
+    """Return further Casimirs, independent of the declared ones, and notes for the user.
 
-    The search ends when there are as many Casimirs as the corank of π. The notes say which parts of the search were
-    omitted.
+    The Casimirs have the names C1, C2, …, as far as these are unused. The search ends when there are as many Casimirs
+    as the corank of π. If it finds fewer, the notes say which parts of the search were omitted.
     """
     slopes = [gradient(c, coordinates) for c in declared.values()]
     ranks = generic_ranks([poisson, slopes])
@@ -93,7 +93,7 @@ def _candidates(
             yield from _monomial(coordinates, a)
             return
         case LiePoisson(algebra):
-            # Sparse polynomials of degree up to 3 come first. The traces after them have many terms, but may have any
+            # Sparse polynomials of degree up to 3 come first. Then come traces, which have many terms but may have any
             # degree.
             yield from polynomial_casimirs(coordinates, poisson, shape, 3, [])
             representation = known_representation(algebra)
@@ -113,9 +113,10 @@ def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:
 
 
 def _monomial(coordinates: Sequence[str], a: Matrix) -> Iterator[Expression]:
-    """Yield the Casimirs of a log-canonical π with the matrix A: x^u for the vectors u of a basis of the kernel of A.
+    """Yield Casimirs of a log-canonical π with the matrix A: x^u for each vector u of a basis of the kernel of
+    A.
 
-    If u contains parameters, ½ Σ u_i log x_i² takes the place of x^u.
+    If u contains parameters, the Casimir is ½ Σ u_i log x_i² instead of x^u.
     """
     field, vectors = _kernel(a)
     for vector in vectors:

@@ -18,10 +18,10 @@ COMMUTING = "the sources of noise commute, hence strong order 1"
 
 
 def check(system: System) -> list[Statement]:
-    """Return the statements about π, the Casimirs, the invariants and the rank of a system; not those about forces and
-    noise.
+    """Return the statements about π, the Casimirs, the invariants and the rank of π.
 
-    Declared Casimirs come first, in the order of the spec, then those that were found.
+    The Casimirs are in the order of the spec; those that phigen found come last. Statements about forces and noise are
+    made by `force_statements` and `noise_statements`.
     """
     return [
         skew_symmetry(system),
@@ -41,7 +41,7 @@ def skew_symmetry(system: System) -> Statement:
 
 
 def casimir_statements(system: System) -> Iterator[Statement]:
-    """Yield for each Casimir C, declared or found, the statement π∇C = 0."""
+    """Yield the statement π∇C = 0 for each Casimir C, whether the spec declares it or phigen found it."""
     for name, casimir in system.casimirs.items():
         flow = hamiltonian_vector_field(system.poisson, gradient(casimir, system.coordinates))
         residuals = [(f"{{{c}, {name}}}", f) for c, f in zip(system.coordinates, flow, strict=True)]
@@ -50,8 +50,11 @@ def casimir_statements(system: System) -> Iterator[Statement]:
 
 
 def invariant_statements(system: System) -> Iterator[Statement]:
-    """Yield for each declared invariant F the statement dF/dt = 0: {F, H} + ∂_t F = 0 or, with forces, along their
-    vector field."""
+    """Yield the statement dF/dt = 0 for each declared invariant F, along the vector field of the system without
+    noise.
+
+    Without forces, dF/dt is {F, H} + ∂_t F.
+    """
     flow = system.vector_field()
     for name, invariant in system.invariants.items():
         slopes = gradient(invariant, system.coordinates)
@@ -63,7 +66,11 @@ def invariant_statements(system: System) -> Iterator[Statement]:
 
 
 def force_statements(system: System) -> Iterator[Statement]:
-    """Yield the statements about forces: how each Casimir changes, and that damping changes H at the rate −λ |π∇H|²."""
+    """Yield the statements about forces.
+
+    There is one for each Casimir: the rate at which the forces change it. With damping, a further statement says that
+    the damping changes H at the rate −λ |π∇H|².
+    """
     if system.forces is None:
         return
     for name, casimir in system.casimirs.items():
@@ -82,10 +89,10 @@ def force_statements(system: System) -> Iterator[Statement]:
 
 
 def noise_statements(system: System) -> Iterator[Statement]:
-    """Yield the statements about noise: whether its sources commute, which gives the strong order, and a stationary
-    density.
+    """Yield the statements about noise.
 
-    That the density exp(−H/θ) is stationary for some temperature θ is stated only if it is proved.
+    The first one says whether the sources of noise commute, which decides the strong order. The second one says that
+    the density exp(−H/θ) is stationary for some temperature θ. It is left out if it is not proved.
     """
     if not system.noise:
         return
@@ -124,10 +131,11 @@ def _commutation(system: System) -> Statement:
 
 
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
-    """Return a label, and an expression that is 0 if and only if the flows of the noise sources i and j commute.
+    """Return a label, and an expression that is 0 if and only if the flows of the noise sources i and j
+    commute.
 
-    The expression is the sum of the squares of the components of π∇{σ_i g_i, σ_j g_j}, where g_i is the Hamiltonian of
-    source i and σ_i its amplitude.
+    Let g_i be the Hamiltonian of source i, and σ_i its amplitude. The expression is the sum of the squares of the
+    components of π∇{σ_i g_i, σ_j g_j}.
     """
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
@@ -139,11 +147,13 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
 def _temperature(
     system: System, slope: Sequence[Expression], diffusive_rate: Sequence[Expression], spread: Sequence[Expression]
 ) -> Expression | None:
-    """Return a temperature T for which the density exp(−H/T) may be stationary, from one sample point; None if there is
-    none.
+    """Return a temperature T for which the density exp(−H/T) may be stationary, or None if no sample point
+    gives one.
 
-    ``slope`` is ∇H, ``diffusive_rate`` is the field πζ + f of the forces, and ``spread`` is Σ σ²(XH)X over the sources
-    of noise with amplitude σ and field X. At the sample point the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0.
+    The density can be stationary only if the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0. T is the solution of
+    this equation at one sample point. ``slope`` is ∇H. ``diffusive_rate`` is πζ + f, the vector field of the forces.
+    ``spread`` is Σ σ²(XH)X, a sum over the sources of noise, where σ is the amplitude and X the vector field of a
+    source.
     """
     loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))
@@ -157,7 +167,7 @@ def _temperature(
 
 def _ratio(numerator: Expression, denominator: Expression) -> Expression:
     """Return the quotient of two expressions, with common factors cancelled."""
-    # Two rounds: the first one replaces squares of roots, so that the second one finds the common factors.
+    # There are two rounds: the first one replaces squares of roots, and only then the second one finds common factors.
     for _ in range(2):
         tower = Tower(symbols_of(numerator, denominator), [numerator, denominator])
         a, b = (tower.simplified(e) for e in tower.convert_all([numerator, denominator]))

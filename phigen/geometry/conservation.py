@@ -33,9 +33,9 @@ ENERGY = "energy"
 
 
 def rounding(steps: int) -> float:
-    """Return a bound for the round-off error of a quantity after a number of steps, relative to the size of its terms.
+    """Return a bound for the round-off error of a quantity after a number of steps.
 
-    The bound grows as √steps.
+    The bound is relative to the size of the terms of the quantity. It grows as √steps.
     """
     return 1e-15 * (20 + math.sqrt(steps))
 
@@ -44,9 +44,10 @@ def rounding(steps: int) -> float:
 class Unit:
     """The unit in which errors of a quantity are measured: its ``size``, and its ``kind``.
 
-    The kind is `RELATIVE` to the value at the start, `TERMS` or `SITES` (relative to the size of terms or of the
-    energies of sites at the start), or `ABSOLUTE`. ``terms`` is the size of the terms in this unit, to which rounding
-    errors are proportional. ``moves`` says that time, forces or noise change the quantity, so that its changes are no
+    The kind says to what errors are relative: `RELATIVE` to the value of the quantity at the start, `TERMS` to the size
+    of its terms at the start, or `SITES` to the sum of the absolute energies of the sites at the start. Errors of the
+    kind `ABSOLUTE` are not relative to anything. ``terms`` is the size of the terms in this unit; rounding errors are
+    proportional to it. ``moves`` is true if time, forces or noise change the quantity, so that its changes are no
     errors.
     """
 
@@ -61,7 +62,7 @@ class Unit:
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """Return the errors, in this unit, of values of the quantity along a trajectory; both arrays have the shape
+        """Return the errors, in this unit, of ``values`` of the quantity along a trajectory. Both arrays have the shape
         (rows,).
 
         ``start`` is the value of the quantity at the start.
@@ -81,21 +82,24 @@ def units(
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
-    """Return the units of the energy and of the Casimirs of a system, by name, for a trajectory from ``start``
-    (DIM,)."""
+    """Return the units of the energy and of the Casimirs of a system, by name.
+
+    The trajectory begins at the state ``start`` (DIM,).
+    """
     quantities = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))
 
 
 def moving(system: System) -> list[str]:
-    """Return the names of the quantities that time, forces or noise change: the energy and some Casimirs."""
+    """Return the names of the quantities among energy and Casimirs that time, forces or noise change."""
     return [ENERGY, *system.pushed] if system.driven else []
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """Return the unit of a quantity from its ``value`` and the size of its ``terms`` at the start of a trajectory.
+    """Return the unit of a quantity whose ``value`` and size of ``terms`` at the start of a trajectory are
+    given.
 
-    ``kind`` is the kind of the unit if the value is nearly 0: `TERMS` or `SITES`.
+    If the value is nearly 0, the unit has the ``kind``, `TERMS` or `SITES`.
     """
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
@@ -105,22 +109,25 @@ def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
 def value_and_terms(
     quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]
 ) -> tuple[Floats, Floats]:
-    """Return the values of a quantity Q and the sizes Σ |x_i ∂_i Q| of its terms, at one state or at each state of a
-    trajectory."""
+    """Return the values of a quantity Q and the sizes Σ |x_i ∂_i Q| of its terms.
+
+    The ``values`` of the symbols are those at one state, or arrays of those at each state of a trajectory.
+    """
     value, *slopes = evaluate([quantity, *gradient(quantity, coordinates)], values)
     with np.errstate(all="ignore"):
         return value, np.asarray(sum(np.abs(values[c] * slope) for c, slope in zip(coordinates, slopes, strict=True)))
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """Return the largest of |Q| and Σ |x_i ∂_i Q| along a trajectory; rounding errors of Q are proportional to this
-    number."""
+    """Return the largest value of |Q| and Σ |x_i ∂_i Q| along a trajectory. Rounding errors of Q are proportional to
+    it.
+    """
     value, terms = value_and_terms(quantity, coordinates, values)
     return float(np.max(np.maximum(np.abs(value), terms))) or 1.0
 
 
 def stated(units_by_name: Mapping[str, Unit]) -> str:
-    """Return the sentence that tells the reader of a figure or table the units of errors.
+    """Return a sentence for a figure or table: the units of the errors in it.
 
     ``units_by_name`` has the unit of each quantity.
     """

@@ -1,4 +1,6 @@
-"""Tests whether the formulas of a system are defined: that they do not divide by 0, and have values at some points."""
+"""Tests whether the formulas of a system are defined: they must not divide by 0, and must have values at some
+points.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,12 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Number of sample points, and factors by which their coordinates are multiplied. So points of size 1, points near 0
-#: and points far away are tried.
+#: POINTS is the number of sample points. Their coordinates are multiplied by each of the SCALES in turn, which gives
+#: points of size 1, points near 0 and points far away.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
-#: Absolute value above which an expression is certainly not 0: rounding errors of an expression that is 0 are much
-#: smaller.
+#: An expression with a larger absolute value is certainly not 0: the rounding errors of an expression that is 0 are
+#: much smaller.
 _NONZERO = 1e-6
 
 Point = Mapping[str, float]
@@ -26,9 +28,8 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     """Yield a statement for each part of a system that seems to be undefined everywhere.
 
     The parts are H, π, the forces, the noise, and each Casimir and invariant. ``starts`` has the values of coordinates
-    and parameters at the starts of runs. The statement that a part is defined is refuted if the part divides by 0, or
-    if it has no value at all sample points and starts. If there are no starts, missing values leave the statement
-    undecided.
+    and parameters at the starts of runs. The statement that a part is defined is refuted if the part divides by 0. It
+    is also refuted if the part has no value at any sample point and at any start. Without starts, it is then undecided.
     """
     for name, roots in _parts(system).items():
         divisor = _divided_by_zero(roots, system.positive)
@@ -41,8 +42,10 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
 
 
 def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
-    """Yield a statement for each run at whose start some part of the system has no value; ``starts`` has the starts by
-    run."""
+    """Yield a statement for each run that starts where some part of the system has no value.
+
+    ``starts`` maps the name of a run to its start.
+    """
     parts = _parts(system)
     for run, point in starts.items():
         undefined = [name for name, roots in parts.items() if not _is_defined(roots, point)]
@@ -56,8 +59,9 @@ def start_is_defined(run: str) -> str:
 
 
 def _parts(system: System) -> dict[str, Sequence[Expression]]:
-    """Return the expressions of a system by the name of the part: H, forces, noise, π, each Casimir and each
-    invariant."""
+    """Return the parts of a system (H, forces, noise, π, each Casimir, each invariant) as lists of expressions, by
+    name.
+    """
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
     if system.forces:
         parts["the force"] = [*system.forces.covector, *system.forces.vector]
@@ -67,7 +71,7 @@ def _parts(system: System) -> dict[str, Sequence[Expression]]:
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
-    """Return a text about a divisor, or an argument of a logarithm, that is 0 everywhere; "" if there is none."""
+    """Return a text that names a divisor, or the argument of a logarithm, that is 0 everywhere; "" without one."""
     for e in topological(list(roots)):
         if e.op == "log" or (e.op == "pow" and e.value < 0):
             (argument,) = e.args
@@ -80,7 +84,7 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the value of an expression at a sample point is 0 up to rounding; only then is a proof tried."""
+    """Whether the value of an expression at a sample point is 0 up to rounding. Only then a proof is attempted."""
     names = symbols_of(e)
     for k in range(POINTS):
         try:

@@ -86,9 +86,9 @@ def _su(n: int) -> tuple[int, list[Entries]]:
 
 
 def _complexified(real: Entries, imaginary: Entries) -> Entries:
-    """Return the real 2n×2n matrix of the complex n×n matrix a + ib, with the block (a −b; b a) for each entry.
+    """Return the real 2n×2n matrix that represents the complex n×n matrix a + ib.
 
-    Rows and columns alternate between real and imaginary parts.
+    Each complex entry becomes a 2×2 block (a −b; b a). So rows and columns alternate between real and imaginary parts.
     """
     real_entries = {}
     for (i, j), v in real.items():
@@ -116,8 +116,8 @@ def _aff(n: int) -> tuple[int, list[Entries]]:
     return n + 1, [_unit(i, j) for i, j in _all(n)] + [_unit(i, n) for i in range(n)]
 
 
-#: Name of a family → (smallest size n, the dimension as a function of n, the size and the entries of the basis matrices
-#: as a function of n).
+#: The families by name. A family is a tuple of three: the smallest size n; the dimension as a function of n; and a
+#: function of n that returns the number of rows of the basis matrices and their entries.
 FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, list[Entries]]]]] = {
     "so": (2, lambda n: n * (n - 1) // 2, _so),
     "se": (2, lambda n: n * (n + 1) // 2, _se),
@@ -133,7 +133,7 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, 
 def dimension(family: str, size: int) -> int:
     """Return the dimension of the Lie algebra with this family and size, such as so(4).
 
-    Raises `SpecError` for an unknown family, and for a size for which the family has no algebra.
+    Raises `SpecError` for an unknown family, and for a size that the family does not have.
     """
     if family not in FAMILIES:
         families = ", ".join(f"{name}(n)" for name in FAMILIES)

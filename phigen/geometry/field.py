@@ -66,11 +66,11 @@ class Ratio:
 
 
 class Field(Arithmetic[Scalar]):
-    """The smallest field Q(symbols) that contains some expressions, with elements of the type `Scalar`.
+    """The smallest field Q(symbols) that contains some expressions. Its elements have the type `Scalar`.
 
     Functions of parameters, such as ``sqrt(l)``, and constants such as ``pi`` count as independent symbols. So an
-    element that is 0 only by a relation between them counts as nonzero. This affects only the recognition of algebraic
-    structures; statements about them are proved in a `Tower`.
+    element that is 0 only because of a relation between functions counts as nonzero. This affects only the recognition
+    of algebraic structures; statements about them are proved in a `Tower`.
     """
 
     def __init__(self, expressions: Iterable[Expression] = ()) -> None:
@@ -110,7 +110,9 @@ class Field(Arithmetic[Scalar]):
         return self.number(value)
 
     def variable(self, name: str) -> Scalar:
-        """Raise `KeyError` for a symbol that the field does not contain; all other symbols are converted by `visit`."""
+        """Raise `KeyError`: the field does not contain the symbol ``name``. Symbols of the field are converted by
+        `visit`.
+        """
         raise KeyError(name)
 
     def power(self, base: Scalar, exponent: Fraction) -> Scalar:
@@ -120,8 +122,9 @@ class Field(Arithmetic[Scalar]):
         return base ** int(exponent)
 
     def function(self, name: str, args: list[Scalar]) -> Scalar:
-        """Raise `KeyError` for a function that the field does not contain; all other functions are converted by
-        `visit`."""
+        """Raise `KeyError`: the field does not contain this function. Functions in the field are converted by
+        `visit`.
+        """
         raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:

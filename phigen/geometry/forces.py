@@ -1,8 +1,8 @@
 """Forces in addition to the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
 
-πζ is tangent to the symplectic leaves, and every field tangent to the leaves has this form; so ζ conserves all
-Casimirs. Damping by the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². The vector field f is arbitrary, and
-changes Casimirs in general.
+The field πζ is tangent to the symplectic leaves, so ζ changes no Casimir. Conversely, every field that is tangent to
+the leaves is πζ for some ζ. Damping by the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². The vector field f
+is arbitrary, and changes Casimirs in general.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The matrix π_ij = {x_i, x_j}, from each of the forms in which specs can state a Poisson structure."""
+"""The matrix π_ij = {x_i, x_j} of a Poisson structure, for each form in which specs can state the structure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, symbol, 
 
 
 def structure(form: PoissonForm, coordinates: Sequence[str]) -> tuple[Matrix, Shape]:
-    """Return the matrix π of a form of specs, and its shape, such as constant or Lie–Poisson.
+    """Return the matrix π that a form of a spec describes, and its shape, such as constant or Lie–Poisson.
 
     Raises the errors of `algebra_of_form` and `poisson_matrix`.
     """
@@ -33,9 +33,10 @@ def structure(form: PoissonForm, coordinates: Sequence[str]) -> tuple[Matrix, Sh
 
 
 def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAlgebra | None = None) -> Matrix:
-    """Return the n×n matrix π for a form of specs; ``algebra`` is the result of `algebra_of_form`, if it is known.
+    """Return the n×n matrix π that a form of a spec describes.
 
-    Raises `SpecError` if the size of a matrix does not match the number of coordinates.
+    ``algebra`` is the result of `algebra_of_form`, if the caller has it. Raises `SpecError` if the size of a matrix
+    does not match the number of coordinates.
     """
     n = len(coordinates)
     match form:
@@ -61,8 +62,8 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
 
 
 def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra | None:
-    """Return the Lie algebra of a ``lie_algebra`` form, with the negated bracket for ``sign: minus``; None for other
-    forms.
+    """Return the Lie algebra of a form ``lie_algebra``; None for other forms. With ``sign: minus`` its bracket is
+    negated.
 
     Raises `SpecError` for an unknown family, for a dimension other than the number of coordinates, and for matrices or
     structure constants that do not define a Lie algebra.
@@ -70,8 +71,8 @@ def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra
     if not isinstance(form, LieAlgebraForm):
         return None
     if form.family:
-        # The dimension is checked before the matrices are built. Building them would take minutes for a typing error
-        # such as so(1000).
+        # The dimension is checked before the matrices are built. For a typing error such as so(1000), building the
+        # matrices would take minutes.
         _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:
@@ -139,8 +140,8 @@ def _minor(
     """Return the determinant of the last k rows, restricted to k ``columns``, by expansion along the first of these
     rows.
 
-    ``minors`` stores each determinant by its columns. There are 2ⁿ sets of columns, while an expansion that stores
-    nothing has n! terms.
+    ``minors`` stores each determinant under its columns. There are 2ⁿ sets of columns; without storage, the expansion
+    would have n! terms.
     """
     if not columns:
         return ONE

@@ -1,7 +1,8 @@
-"""Decomposition of a Lie algebra into a direct sum of ideals, in a basis that mixes them, as for so(4) = so(3) ⊕ so(3).
+"""Decomposition of a Lie algebra into a direct sum of ideals, as in so(4) = so(3) ⊕ so(3).
 
-The projections onto the ideals commute with every ad_X. So they lie in the centroid, the space of linear maps T with
-T[X, Y] = [TX, Y]. They follow from primary decompositions of elements of the centroid over Q.
+The elements of the basis need not lie in the ideals. The projections onto the ideals commute with every ad_X. So they
+lie in the centroid, the space of linear maps T with T[X, Y] = [TX, Y]. They follow from primary decompositions of
+elements of the centroid over Q.
 """
 
 from __future__ import annotations
@@ -24,10 +25,11 @@ Rows = tuple[tuple[Fraction, ...], ...]
 
 
 def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
-    """Return the projections e_1, …, e_r onto ideals of which the algebra is the direct sum: Σ e_a = 1, e_a e_b = 0.
+    """Return projections e_1, …, e_r onto ideals whose direct sum is the algebra: Σ e_a = 1, and e_a e_b = 0
+    for a ≠ b.
 
-    Each projection is a matrix by rows in the basis E_i; its column j is the image of E_j. The result is the identity
-    alone if the algebra is indecomposable or large, or if its structure constants contain parameters.
+    Each projection is a matrix by rows in the basis E_i; its column j is the image of E_j. The identity is the only
+    result if the algebra is indecomposable or large, or if its structure constants contain parameters.
     """
     n = algebra.dimension
     parts = [_identity(n)]
@@ -54,7 +56,7 @@ def _centroid(algebra: LieAlgebra) -> list[Any]:
     for i in range(n):
         for j in range(n):
             rows: list[dict[int, Scalar]] = [{} for _ in range(n)]
-            for k, c in constants[i][j].items():  # T[E_i, E_j] for an unknown matrix T; unknown m·n + k is T_mk
+            for k, c in constants[i][j].items():  # T[E_i, E_j]; T_mk is unknown number m·n + k
                 for m in range(n):
                     rows[m][m * n + k] = rows[m].get(m * n + k, field.zero) + c
             for a in range(n):  # minus [TE_i, E_j] = Σ_a T_ai [E_a, E_j]
@@ -65,7 +67,7 @@ def _centroid(algebra: LieAlgebra) -> list[Any]:
 
 
 def _idempotents(element: Any) -> list[Any]:
-    """Return the projections onto the primary components of a matrix over Q; [] if the matrix has only one."""
+    """Return the projections onto the primary components of a matrix over Q; [] if there is only one component."""
     minimal = element.minpoly()
     _, factors = minimal.factor()
     if len(factors) < 2:

@@ -1,5 +1,7 @@
-"""Recognition of functions that are polynomials by an identity, such as x·(sin(y)**2 + cos(y)**2) or (x**2 - 1)/(x -
-1)."""
+"""Recognition of polynomials that are written as other functions.
+
+Examples are x·(sin(y)**2 + cos(y)**2) and (x**2 - 1)/(x - 1).
+"""
 
 from __future__ import annotations
 
@@ -15,18 +17,19 @@ from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 #: Largest degree of polynomials that are recognised. The entries of constant, linear and log-canonical tensors π have
 #: degree ≤ 2.
 DEGREE = 2
-#: Points (a, a + b, a + 2b, …) at which Taylor polynomials are tried, as pairs (a, b). Many functions have rational
-#: values at the first two points.
+#: Pairs (a, b), for the points (a, a + b, a + 2b, …). At the first point where this is possible, the function is
+#: expanded in a Taylor polynomial. Many functions have rational values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Largest number of lines that are tried until the function has values on one of them.
+#: Largest number of lines that are tried. The search ends at the first line on which the function has values.
 _LINES = 8
 
 
 def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Expression | None:
-    """Return the polynomial in the coordinates, of degree ≤ `DEGREE`, that equals an expression; None if there is none.
+    """Return the polynomial of degree ≤ `DEGREE` in the coordinates that equals an expression; None if there is
+    none.
 
-    Its coefficients are Taylor coefficients at a point. The equality is then proved in the ring of the functions that
-    occur; without a proof, the result is None.
+    The coefficients of the polynomial are Taylor coefficients of the expression at a point. The equality is then proved
+    in the ring of the functions that occur; without a proof, the result is None.
     """
     moving = [c for c in symbols_of(e) if c in coordinates]
     if not _flat_on_a_line(e, moving):

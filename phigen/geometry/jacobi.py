@@ -29,7 +29,7 @@ def jacobi_identity(system: System) -> Statement:
 def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
     """Yield the nonzero cyclic sums of the Jacobi identity, with the names of their three coordinates.
 
-    Only products of two nonzero factors are computed, of which large structures have few.
+    Products with a factor 0 are skipped, so few products are computed even for large structures.
     """
     names = system.coordinates
     n = range(len(names))
@@ -44,7 +44,7 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
                     for k, second_factor in rows[a].items() if slope != 0 else ():
-                        # only one of the cyclic orders of each triple
+                        # Of the three cyclic orders of a triple, only the one with i < j < k is taken.
                         if k not in (i, j) and (i < j < k or j < k < i or k < i < j):
                             indices = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
                             sums[indices] = sums.get(indices, tower.zero) + tower.product(slope, second_factor)

@@ -31,8 +31,9 @@ class Representation:
 class LieAlgebra:
     """Lie algebra over Q(parameters) with a basis E_1 … E_n.
 
-    ``constants[(i, j)][k]`` is c_ij^k for i < j; zeros are left out, and c_ji^k = −c_ij^k. ``representation`` is
-    faithful, and set if the spec or the named family provides matrices. ``labels`` are names of the E_i for messages.
+    ``constants[(i, j)][k]`` is c_ij^k for i < j; zeros are left out, and c_ji^k = −c_ij^k. ``representation`` has
+    faithful matrices if the spec or the named family provides them, else it is None. ``labels`` are names of the E_i
+    for messages.
     """
 
     name: str
@@ -65,7 +66,7 @@ class LieAlgebra:
         return tuple(tuple(total(c * x[k] for k, c in sorted(self.bracket(i, j).items())) for j in n) for i in n)
 
     def opposite(self) -> LieAlgebra:
-        """Return the algebra with the negated bracket, which is represented by the matrices −ρ(E_i)."""
+        """Return the algebra with the negated bracket. The matrices −ρ(E_i) represent it."""
         rep = self.representation
         if rep is not None:
             negated = tuple({position: -v for position, v in m.items()} for m in rep.matrices)

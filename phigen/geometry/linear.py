@@ -18,11 +18,11 @@ Key = TypeVar("Key", bound=Any)
 class _Row(Generic[Key]):
     pivot: Key
     entries: dict[Key, Scalar]  # key → entry; 1 at the pivot
-    combination: dict[int, Scalar]  # the row as a combination of the given vectors
+    combination: dict[int, Scalar]  # coefficients with which the vectors of the span add up to the row
 
 
 class Span(Generic[Key]):
-    """The span of some sparse vectors (key → nonzero scalar), with coordinates of its elements in terms of these
+    """The span of some sparse vectors (key → nonzero scalar). It computes coordinates of elements in terms of these
     vectors.
 
     ``dependent`` has the positions of those vectors that are linear combinations of earlier ones.
@@ -70,8 +70,8 @@ class Span(Generic[Key]):
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
         remainder = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
-        # A row does not contain the pivots of other rows. So each pivot in the vector is eliminated once, and no new
-        # pivots appear.
+        # No row has an entry at the pivot of another row. So eliminating a pivot brings in no further pivots, and one
+        # pass over the pivots in the vector suffices.
         for row, factor in [(self._by_pivot[k], v) for k, v in remainder.items() if k in self._by_pivot]:
             add_multiple(remainder, row.entries, -factor)
             add_multiple(combination, row.combination, -factor)
@@ -89,9 +89,9 @@ def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor
 
 
 def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> list[dict[int, Scalar]]:
-    """Return a basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows.
+    """Return a basis of the kernel: the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows.
 
-    Each basis vector is 1 at its last nonzero position; all other basis vectors are 0 at this position.
+    Each basis vector is 1 at its last nonzero position, where all other basis vectors are 0.
     """
     echelon: dict[int, dict[int, Scalar]] = {}
     for row in sorted(rows, key=len):
@@ -119,8 +119,10 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
 
 
 def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
-    """Return the multiple of a vector over Q whose entries are coprime integers; the entry with the smallest key is
-    positive."""
+    """Return the multiple of a vector over Q whose entries are coprime integers.
+
+    The entry with the smallest key is positive.
+    """
     exact = {k: rational(v) for k, v in sorted(vector.items())}
     scale = lcm(*(v.denominator for v in exact.values()))
     integers = {k: int(v * scale) for k, v in exact.items()}

@@ -1,4 +1,4 @@
-"""Lie algebras from matrices and from structure constants in specs, after a check that these define a Lie algebra."""
+"""Lie algebras from matrices or structure constants of specs. It is checked that these define a Lie algebra."""
 
 from __future__ import annotations
 
@@ -35,8 +35,7 @@ def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
 def algebra_of_sparse_matrices(
     name: str, size: int, matrices: Sequence[Mapping[tuple[int, int], Expression]]
 ) -> LieAlgebra:
-    """Return the Lie algebra with these matrices as its basis, each given by its nonzero entries: (row, column) →
-    value.
+    """Return the Lie algebra with these matrices as its basis. A matrix maps (row, column) to a nonzero entry.
 
     Raises `SpecError` for a linearly dependent matrix, and for two matrices whose commutator is outside the span.
     """

@@ -25,7 +25,9 @@ class Source:
     amplitude: Expression
 
     def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-        """Return the covector σ∇g; times an increment ΔW, it is added to the covector of a step."""
+        """Return the covector σ∇g. A step adds the product of this covector and a noise increment ΔW to its
+        covector.
+        """
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 
 

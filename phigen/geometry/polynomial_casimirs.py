@@ -13,7 +13,8 @@ from phigen.geometry.shapes import LiePoisson, Matrix, Shape, Terms, coordinate_
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
 
-#: Largest number of unknown coefficients of the linear equations, if π contains no parameters, and if it contains some.
+#: Largest number of unknowns in the linear equations for the coefficients: the first number if π contains no
+#: parameters, the second one if it contains some.
 UNKNOWNS, UNKNOWNS_WITH_PARAMETERS = 800, 60
 
 Exponents = tuple[int, ...]
@@ -24,9 +25,9 @@ def polynomial_casimirs(
 ) -> Iterator[Expression]:
     """Yield a basis of the polynomial Casimirs without constant terms, of degree 1, then 2, … up to ``degree``.
 
-    If all terms of π have the same degree, the Casimirs are homogeneous; otherwise those of degree d may contain terms
-    of lower degree. If the linear equations for a degree are too large, the search ends, and a note is added to
-    ``notes``.
+    If all terms of π have the same degree, the Casimirs are homogeneous. Otherwise a Casimir of degree d may contain
+    terms of lower degree. If the linear equations for some degree are too large, the search ends, and a note is added
+    to ``notes``.
     """
     n = len(coordinates)
     candidates = (
@@ -60,7 +61,7 @@ def polynomial_casimirs(
 def _linear_terms(algebra: LieAlgebra) -> list[Terms]:
     """Return the entries of a Lie–Poisson tensor as polynomials, row by row, from the structure constants.
 
-    The form of the result is that of `coordinate_terms`.
+    The result has the form of the result of `coordinate_terms`.
     """
     n = range(algebra.dimension)
     units = [tuple(int(k == m) for m in n) for k in n]
@@ -82,9 +83,9 @@ def _monomials(n: int, degree: int) -> list[Exponents]:
 
 
 def _equations(entries: list[list[dict[Exponents, Scalar]]], monomials: list[Exponents]) -> list[dict[int, Scalar]]:
-    """Return the linear equations for the coefficients of the ``monomials`` in a Casimir, as sparse rows.
+    """Return the linear equations for the coefficients of the ``monomials`` in a Casimir C, as sparse rows.
 
-    There is one equation for each row of π and each monomial that occurs in it.
+    There is one equation for each component of π∇C and each monomial in this component.
     """
     rows: dict[tuple[int, Exponents], dict[int, Scalar]] = {}
     for column, monomial in enumerate(monomials):

@@ -1,4 +1,6 @@
-"""Statements that an expression is positive, or nowhere negative: by its form, or at the starts of runs."""
+"""Statements that an expression is positive, or nowhere negative. They are decided by its form, or at the starts of
+runs.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +12,16 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
 
-#: Signs of the real values of an expression that can follow from its form.
+#: Signs that all real values of an expression may have because of its form.
 POSITIVE, NOT_NEGATIVE = "positive", "not negative"
 _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
 
 
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
-    """Return the statement that ``e`` is positive wherever it has a value other than 0.
+    """Return the statement that all values of ``e`` are positive, except values that are 0.
 
-    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the form of
-    ``e`` shows the sign, given that the symbols ``positive`` are positive. Otherwise it is checked at the starts.
+    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the sign follows
+    from the form of ``e``, where the symbols ``positive`` count as positive. Otherwise it is checked at the starts.
     """
     for point in starts:
         try:
@@ -41,9 +43,10 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
 def not_negative(
     name: str, e: Expression, positive: Collection[str], points: Sequence[Mapping[str, float]]
 ) -> Statement | None:
-    """Return the statement that ``e`` is nowhere negative, decided by its form or else at some ``points``.
+    """Return the statement that ``e`` is nowhere negative, decided by the form of ``e`` or else at some
+    ``points``.
 
-    Returns None if the form does not decide it and there are no points.
+    Returns None if the form decides nothing and there are no points.
     """
     if _sign_of_negative(e, positive) == POSITIVE:
         return Statement(name, REFUTED, "negative by its form", shortened(e))
@@ -71,13 +74,15 @@ def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:
 
 
 def sign_of(e: Expression, positive: Collection[str]) -> str | None:
-    """Return the sign of an expression, if it follows from its form; else None. The symbols ``positive`` are
-    positive."""
+    """Return the sign of an expression if it follows from the form of the expression, else None.
+
+    The symbols ``positive`` count as positive.
+    """
 
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
-        if e.op == "neg":  # decided only if the argument is a negative number or a product with one
+        if e.op == "neg":  # the sign is known if the argument is a negative number, or a product of such a number
             return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None

@@ -83,9 +83,9 @@ def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
 
 
 def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-    """Return x as a function of y: one coordinate after another is solved from an equation without other unknowns.
+    """Return x as a function of y. Each step solves one equation that contains a single unknown coordinate.
 
-    Raises `SpecError` if at some point there is no such equation.
+    Raises `SpecError` if no equation with a single unknown is left that phigen can solve.
     """
     of_affine = _of_affine_map(form, coordinates)
     if of_affine is not None:
@@ -111,7 +111,9 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
-    """Return the inverse of y = ψ(x) if its Jacobian matrix J is constant: x = J⁻¹(y − ψ(0)); else None."""
+    """Return the inverse of an affine map y = ψ(x), x = J⁻¹(y − ψ(0)), where J is its constant Jacobian matrix; else
+    None.
+    """
     columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
     if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
         return None
@@ -138,10 +140,9 @@ def _next_solved(
 
 
 def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
-    """Return the solution x of e(x) = value: directly if e is linear in x, else by inverting one operation after
-    another.
+    """Return the solution x of the equation e(x) = value; None if phigen cannot solve it.
 
-    Returns None if an operation has no known inverse.
+    An equation that is linear in x is solved directly. Otherwise the operations of e are inverted one after another.
     """
     slope = _simplified(derivatives([e], x)[0])
     if x not in symbols_of(slope):
@@ -170,6 +171,6 @@ def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
 
 
 def _simplified(e: Expression) -> Expression:
-    """Return an expression in the normal form of its ring, or unchanged if it has fewer operations."""
+    """Return the normal form of an expression in its ring, or the expression itself if it has fewer operations."""
     tower = Tower(symbols_of(e), [e])
     return min(tower.expression(tower.convert(e)), e, key=lambda f: sum(1 for node in topological([f]) if node.args))

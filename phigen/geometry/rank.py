@@ -1,5 +1,4 @@
-"""Generic rank of a matrix of expressions: its rank at sample points with rational coordinates, computed modulo
-primes."""
+"""Generic rank of a matrix of expressions: the rank at sample points with rational coordinates, modulo primes."""
 
 from __future__ import annotations
 
@@ -17,18 +16,20 @@ from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 #: Number of points at which the rank is computed; the largest of these ranks is the result.
 POINTS = 3
 ATTEMPTS = 64
-#: Primes modulo which ranks are computed. A rank modulo a prime never exceeds the rank over Q, and is smaller only for
-#: few primes. So the larger one of the ranks modulo the two primes is taken.
+#: Primes modulo which ranks are computed. A rank modulo a prime is never larger than the rank over Q, and it is smaller
+#: only for few primes. So the larger one of the two ranks is taken.
 PRIMES = (2**61 - 1, 2**63 - 25)
 
 Rows = Sequence[Sequence[Expression]]
 
 
 def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> list[int] | None:
-    """Return the rank of each matrix at generic points; None if no point was found at which all entries have values.
+    """Return the rank of each matrix at generic points; None if no point was found at which all entries have
+    values.
 
-    The rank at a point never exceeds the generic rank, and is smaller at exceptional points only. So the result is the
-    largest rank at `POINTS` points. If entries are not rational functions, they are evaluated to `DIGITS` digits.
+    The rank at a point is never larger than the generic rank, and it is smaller at exceptional points only. So the
+    result is the largest rank at `POINTS` points. If entries are not rational functions, they are evaluated to `DIGITS`
+    digits.
     """
     roots = [e for m in matrices for row in m for e in row]
     names, exact = symbols_of(*roots), is_rational(*roots)
@@ -65,10 +66,10 @@ def _residues(rows: Sequence[Sequence[Fraction]], prime: int) -> list[int]:
 
 
 def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:
-    """Return the rank of a matrix by elimination with full pivoting; each entry is a pair (value, scale).
+    """Return the rank of a matrix by elimination with full pivoting. An entry is a pair (value, scale).
 
-    The scale bounds the terms of which the value is the sum. Values that are tiny relative to the largest scale count
-    as 0.
+    The scale is the largest absolute value of an intermediate result in the computation of the value. Values that are
+    tiny relative to the largest scale count as 0.
     """
     left = [[value for value, _ in row] for row in rows]
     threshold = max((scale for row in rows for _, scale in row), default=1) * 10**-ZERO_DIGITS

@@ -26,16 +26,17 @@ _LARGEST_MATCHED = 45
 
 
 def known_representation(algebra: LieAlgebra) -> Representation | None:
-    """Return the matrices that the spec gives for an algebra, or those of a named family with the same structure
-    constants.
+    """Return the matrices that the spec gives for an algebra. Without these, return the matrices of a named
+    family.
 
-    The structure constants of the family may also be the negated ones. Returns None if there are no such matrices.
+    The family must have the same structure constants, or the negated ones. If there is no such family, the result is
+    None.
     """
     return algebra.representation or next(_matching_families(algebra), None)
 
 
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
-    """Yield faithful representations in the order of preference; the matrices that a spec gives are not among them."""
+    """Yield faithful representations in the order of preference, without the matrices that a spec gives."""
     yield from _matching_families(algebra)
     field = algebra.field
     adjoint = _adjoint(algebra, field)
@@ -48,8 +49,10 @@ def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Return the finest partition of the basis elements in which each part spans an ideal, as sorted lists of indices
-    from 0."""
+    """Return the finest partition of the basis elements in which each part spans an ideal.
+
+    A part is a sorted list of indices from 0.
+    """
     part = list(range(algebra.dimension))
     for (i, j), row in algebra.constants.items():
         merged = {part[m] for m in (i, j, *row)}
@@ -83,7 +86,7 @@ def _matching_families(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def _plain(algebra: LieAlgebra) -> dict[tuple[int, int], dict[int, Expression]]:
-    # Equal expressions are the same object, so the constants of two algebras can be compared by ==.
+    # Expressions built in the same way are the same object, so the constants of two algebras can be compared by ==.
     return {ij: dict(row) for ij, row in algebra.constants.items() if row}
 
 
@@ -106,13 +109,13 @@ def _with_characters(
 ) -> Iterator[Representation]:
     """Yield the adjoint representation, extended by 2×2 blocks (0 χ; 0 0) that make it faithful on the centre.
 
-    There is one block for each dimension of the centre; χ is a linear form that vanishes on [g, g]. Nilpotent blocks
-    add nothing to P E_i P in the Cayley transform, while diagonal blocks would add cubic terms. Nothing is yielded if
-    there are too few such forms.
+    There is one block for each dimension of the centre. χ is a linear form that vanishes on [g, g], where g is the
+    algebra. If there are too few such forms, nothing is yielded. Nilpotent blocks add nothing to the product P E_i P in
+    the Cayley transform, while diagonal blocks would add cubic terms.
     """
     derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
     forms: list[dict[int, Scalar]] = []
-    central_values: list[dict[int, Scalar]] = []  # for each chosen form: index of a central vector → value
+    central_values: list[dict[int, Scalar]] = []  # for each form: index in ``centre`` → value
     for form in kernel(field, derived, algebra.dimension):
         values = {m: v for m, z in enumerate(centre) if (v := _pairing(form, z, field)) != 0}
         if values and not Span(field, [*central_values, values]).dependent:
@@ -137,8 +140,11 @@ def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -
 
 
 def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Iterator[Representation]:
-    """Yield the matrices (½ad_X X; 0 0) for X in the Lie algebra g, on the space g ⊕ R; they represent g if [[g, g], g]
-    = 0."""
+    """Yield the matrices (½ad_X X; 0 0) on the space g ⊕ R, where g is the Lie algebra and X runs over its
+    basis.
+
+    They represent g if [[g, g], g] = 0; for other algebras nothing is yielded.
+    """
     derived = [set(row) for row in algebra.constants.values()]
     touched = sorted({k for row in derived for k in row})
     if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):

@@ -1,5 +1,7 @@
-"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A; such a π is constant in the coordinates ∫
-dx_i/g_i(x_i)."""
+"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with a constant matrix A.
+
+Such a π is constant in the coordinates ∫ dx_i/g_i(x_i).
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,10 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
 
 
 def _parts(tower: Tower, element: Poly, coordinates: Sequence[str]) -> dict[int, list[tuple[Poly, int]]] | None:
-    """Return the irreducible factors of an entry of π, by the index of the coordinate on which they depend; −1 for
-    constants.
+    """Return the irreducible factors of an entry of π as pairs (factor, multiplicity), by the index of their
+    coordinate.
 
-    Returns None if a factor depends on several coordinates.
+    Constant factors have the index −1. Returns None if a factor depends on several coordinates.
     """
     content, factors = element.factor()
     parts: dict[int, list[tuple[Poly, int]]] = {-1: [(tower.context.constant(content), 1)]}

@@ -1,5 +1,5 @@
-"""Shapes of Poisson tensors, such as constant or Lie–Poisson, recognised from the matrix π in whatever way it is
-written.
+"""Shapes of Poisson tensors, such as constant or Lie–Poisson. The form in which a spec states π does not
+matter.
 
 Coefficients may contain parameters, and functions of parameters.
 """
@@ -31,8 +31,9 @@ class Constant:
 
 @dataclass(frozen=True)
 class Canonical:
-    """Shape of a constant π with {q_i, p_i} = 1; all other brackets are 0, and the coordinates in ``rest`` are
-    Casimirs."""
+    """Shape of a constant π with {q_i, p_i} = 1, whose other brackets are 0. The coordinates in ``rest`` are
+    Casimirs.
+    """
 
     q: tuple[str, ...]
     p: tuple[str, ...]
@@ -56,7 +57,7 @@ class LogCanonical:
 
 @dataclass(frozen=True)
 class LiePoisson:
-    """Shape {x_i, x_j} = Σ_k c_ij^k x_k, on the dual of a Lie algebra. Its Jacobi identity is not checked here."""
+    """Shape {x_i, x_j} = Σ_k c_ij^k x_k, on the dual of a Lie algebra. The Jacobi identity is not checked here."""
 
     algebra: LieAlgebra
 
@@ -68,8 +69,8 @@ class LiePoisson:
 class Affine:
     """Shape {x_i, x_j} = Σ_k c_ij^k x_k + b_ij, from a Lie algebra with a cocycle b.
 
-    ``extension`` is the central extension by b, which has one more basis element z as its last one: [E_i, E_j] = Σ_k
-    c_ij^k E_k + b_ij z. π is the Lie–Poisson tensor of the extension at z = 1. The Jacobi identity is not checked here.
+    ``extension`` is the central extension by b. Its last basis element z is the additional one: [E_i, E_j] = Σ_k c_ij^k
+    E_k + b_ij z. π is the Lie–Poisson tensor of the extension at z = 1. The Jacobi identity is not checked here.
     """
 
     extension: LieAlgebra
@@ -90,8 +91,9 @@ Shape = Constant | Canonical | LogCanonical | LiePoisson | Affine | General
 
 
 def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
-    """Return the first of these shapes that π has: constant or canonical, log-canonical, Lie–Poisson, affine,
-    general."""
+    """Return the first shape in this list that π has: constant or canonical, log-canonical, Lie–Poisson, affine,
+    general.
+    """
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
     terms = coordinate_terms(coordinates, list(upper.values()))
     if terms is None:
@@ -109,7 +111,7 @@ def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
 def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expression]) -> list[Terms] | None:
     """Return the expressions as polynomials in the coordinates; None if one of them is not a polynomial.
 
-    Functions that are polynomials by an identity, such as sin² + cos² = 1, are recognised.
+    Polynomials that are written as other functions, such as x·(sin² + cos²), are recognised.
     """
     names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
     tower = Tower(names, expressions)
@@ -194,8 +196,10 @@ def _affine(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms]) -
 
 
 def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:
-    """Return the skew n×n matrix with the entries ``upper`` above the diagonal, by (row, column); absent entries are
-    0."""
+    """Return the skew n×n matrix with the entries ``upper`` above the diagonal: (row, column) → entry.
+
+    All other entries above the diagonal are 0.
+    """
 
     def entry(i: int, j: int) -> Expression:
         return upper.get((i, j), ZERO) if i < j else -upper.get((j, i), ZERO)

@@ -15,7 +15,7 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
     """Return a system with H = 0 in the given ``coordinates``, with the π of ``form`` and the parameters of
     ``system``.
 
-    It has no Casimirs and no invariants, since none are searched for. Raises the errors of `structure`.
+    No Casimirs and invariants are searched for, so the system has none. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(
@@ -36,7 +36,7 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 def block_of(system: System, indices: Sequence[int]) -> System:
     """Return a system with H = 0 for a block of π; ``indices`` are those of the coordinates of the block.
 
-    If the spec states a form of π for this block, the system has this form, else the matrix of the block.
+    The form of its π is the form that the spec states for this block or, if there is none, the matrix of the block.
     """
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):

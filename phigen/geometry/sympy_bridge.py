@@ -39,11 +39,11 @@ _TO_SYMPY = {"abs": "Abs"}
 
 
 def expression(value: Any) -> Expression:
-    """Return a sympy expression or a number as an `Expression`; a Float becomes the decimal number that sympy prints
-    for it.
+    """Return a sympy expression or a number as an `Expression`.
 
-    Raises `SpecError` for functions and constants that phigen does not have, and for text, which sympy would evaluate
-    as Python. Raises `LimitError` for numbers out of range.
+    A Float becomes the decimal number as which sympy prints it. Raises `SpecError` for functions and constants that
+    phigen does not have, and for text, which sympy would evaluate as Python. Raises `LimitError` for numbers out of
+    range.
     """
     if isinstance(value, str):
         raise SpecError([Diagnostic(f"{value!r} is text, not a sympy expression")])
@@ -84,7 +84,9 @@ def _node(e: Any, args: list[Expression]) -> Expression:
 
 
 def _rational(e: Any) -> Fraction:
-    """Return a sympy number as a fraction. Raises `LimitError` for numbers that are too large or too long for specs."""
+    """Return a sympy number as a fraction. Raises `LimitError` for numbers with sizes or lengths that specs do not
+    allow.
+    """
     # The size is checked before the conversion: as a fraction, a Float of 1e999999 has a million digits.
     if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):
         value = Fraction(str(e)) if e.is_Float else Fraction(int(e.p), int(e.q))
@@ -95,7 +97,8 @@ def _rational(e: Any) -> Fraction:
 
 
 def named_function(order: int, s: Any) -> Any:
-    """Return the derivative of φ(s) of some order as a function symbol, with primes, for display in formulas.
+    """Return the derivative of φ(s) of this ``order`` as a function symbol with primes, for display in
+    formulas.
 
     φ is the function of `phigen.symbolic.special`.
     """
@@ -103,13 +106,13 @@ def named_function(order: int, s: Any) -> Any:
 
 
 def closed_function(order: int, s: Any) -> Any:
-    """Return the derivative of some order of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
+    """Return the derivative of this ``order`` of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
     u = sympy.Dummy("u")
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
 def expanded_function(order: int, s: Any, degree: int) -> Any:
-    """Return the derivative of some order of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s.
+    """Return the derivative of this ``order`` of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s.
 
     The polynomial has the terms of the power series up to ``degree``.
     """
@@ -147,9 +150,9 @@ def to_sympy(
     symbols: Mapping[str, Any] | None = None,
     special: Callable[[int, Any], Any] = named_function,
 ) -> Any:
-    """Return an expression in sympy, for instance for ``sympy.latex``.
+    """Return an expression as a sympy object, for instance for ``sympy.latex``.
 
-    ``symbols`` maps names to sympy symbols; other names become real symbols, and the momentum of x becomes ``p_x``.
+    ``symbols`` maps names to sympy symbols. Other names become real symbols, and the momentum of x becomes ``p_x``.
     ``special`` makes the derivatives of φ: by name, in closed form or as a polynomial.
     """
     return _Sympy(symbols or {}, special).values(familiar([e]))[0]

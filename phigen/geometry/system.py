@@ -31,12 +31,12 @@ _SHOWN = 60
 class System:
     """A system ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and with sources of ``noise``.
 
-    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; all expressions have the coordinates and parameters as symbols.
+    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}. The symbols of all expressions are coordinates and parameters.
     ``shape`` is the recognised shape of π, and ``form`` its form in the spec. ``casimirs`` has the declared Casimirs in
-    the order of the spec, then those found (``C1``, ``C2``, …); ``declared`` has the names of the declared ones.
-    ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities to
-    record, about which nothing is proved. ``notes`` says which searches were omitted, and why. ``spec`` is the spec of
-    the system, or None if the system was built in Python.
+    the order of the spec, then those that phigen found (``C1``, ``C2``, …). ``declared`` has the names of the declared
+    Casimirs. ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities
+    to record; nothing is proved about them. ``notes`` says which searches were omitted, and why. ``spec`` is the spec
+    of the system, or None if the system was built in Python.
     """
 
     name: str
@@ -60,8 +60,9 @@ class System:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError`; for ``run``, ``runs`` and ``integrate``, its message says that solvers have
-            these attributes."""
+            """Raise an `AttributeError`. For ``run``, ``runs`` and ``integrate``, the message says that solvers have
+            them.
+            """
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
@@ -104,7 +105,7 @@ class System:
     def positive(self) -> tuple[str, ...]:
         """The names of the parameters that are declared positive or nonnegative.
 
-        A statement for all positive values of a parameter also holds at 0.
+        Parameters that may be 0 are included, since a statement that holds for all positive values also holds at 0.
         """
         return tuple(p.name for p in self.parameters if p.bound)
 
@@ -123,8 +124,9 @@ class System:
         return tuple(a + b for a, b in zip(tangent, self.forces.vector, strict=True))
 
     def forced_rate(self, function: Expression) -> Expression:
-        """Return the contribution of the forces to dF/dt for a function F: ∇F·(πζ + f). For F = H, this is their
-        power."""
+        """Return the contribution of the forces to dF/dt for a function F: ∇F·(πζ + f). For F = H, this is the power of
+        the forces.
+        """
         if self.forces is None:
             return ZERO
         field = hamiltonian_vector_field(self.poisson, self.forces.covector)
@@ -185,9 +187,9 @@ class System:
 def system_from_spec(spec: Spec) -> System:
     """Return the system of a spec: the matrix π, its shape, and the Casimirs that phigen finds for it.
 
-    Nothing is proved here, apart from the conditions under which a Lie algebra exists; see `phigen.geometry.checks`.
-    Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants that violate the Jacobi
-    identity, and for sizes that do not match the number of coordinates.
+    The only proof here is that matrices or structure constants define a Lie algebra; `phigen.geometry.checks` has the
+    others. Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants that violate the
+    Jacobi identity, and for sizes that do not match the number of coordinates.
     """
     if spec.lattice:
         raise system_of_lattice(spec)
@@ -208,7 +210,7 @@ def system_from_spec(spec: Spec) -> System:
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
-    """Return the error for the spec of a lattice where a system with a fixed number of coordinates is required."""
+    """Return the error for a lattice in a place where a system with a fixed number of coordinates is required."""
     message = f"{spec.name} is a lattice; a system with a fixed number of coordinates is needed here"
     hint = "phigen.compile accepts it; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
@@ -228,7 +230,7 @@ def build_system(
     forces: SpecForces | None = None,
     noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
-    """Return a `System` from its parts: the shape of π is recognised, and further Casimirs are searched for."""
+    """Return a `System` with these parts. The shape of π is recognised, and further Casimirs are searched for."""
     locations = locations or {}
     declared = dict(casimirs or {})
     try:
@@ -268,7 +270,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
 
 
 def _with_place(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
-    """Return an error whose diagnostics without a location are located at the section ``poisson`` of the spec."""
+    """Return the error with locations for all diagnostics: those without one are located at the section ``poisson``."""
     place = locations.get(("poisson",))
     return SpecError(
         [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]

@@ -18,9 +18,9 @@ _MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
     """Yield tr X^m for m = 1, 2, … up to the number of rows, where X = Σ x_i E^i, and tr(E^i E_j) = δ_ij.
 
-    These traces generate the coefficients of the characteristic polynomial of X. Nothing is yielded if the trace form
-    is degenerate, if a matrix contains parameters, or if the matrices are large. The sequence ends at the first trace
-    with too many terms.
+    The coefficients of the characteristic polynomial of X are polynomials in these traces. Nothing is yielded if the
+    trace form is degenerate, if a matrix contains parameters, or if the matrices are large. The sequence ends at the
+    first trace with too many terms.
     """
     if representation.size > _LARGEST:
         return
@@ -38,8 +38,8 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     for m in range(1, representation.size + 1):
         if m > 2 and m % 2:
             powers.append(_times(tower, powers[-1], element))
-        # tr X^m is computed from two powers of X with about half of the exponent m, which have far fewer terms than
-        # X^(m-1).
+        # tr X^m is computed from two powers of X, each with about half of the exponent m. These have far fewer terms
+        # than X^(m-1).
         pairs = [(powers[m // 2][i][j], powers[m - m // 2][j][i]) for i in n for j in n]
         if sum(len(a) * len(b) for a, b in pairs) > _MOST_PRODUCTS:
             return
@@ -69,8 +69,8 @@ def _dual_element(
 ) -> list[list[Poly]]:
     rows = [[tower.zero for _ in range(size)] for _ in range(size)]
     for i, name in enumerate(coordinates):
-        # The rows of the trace form span the space; the coordinates of unit vector i in terms of them are row i of the
-        # inverse form.
+        # The rows of the trace form span the space. In terms of these rows, unit vector i has the coordinates in row i
+        # of the inverse of the form.
         for j, c in (span.coordinates({i: field.one}) or {}).items():
             for (r, column), v in matrices[j].items():
                 rows[r][column] = rows[r][column] + tower.variable(name) * (c * v)
