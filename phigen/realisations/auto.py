@@ -18,10 +18,10 @@ from phigen.spec.model import BirealisationChoice, PullbackForm
 
 KIND = "auto"
 
-#: Reason of the choice, as text for the user. The numbers 8 to 26 were measured for random quadratic H and for tops.
-#: They are the median of |π∇S_3| with the Cayley transform, divided by the median with the exponential: 26 on so(3)*, 8
-#: on se(3)*, 15 on so(4)*. For |π∇S_5| the quotients are 710, 49 and 330. On sl(2)* and gl(2)*, all quotients are
-#: between 0.9 and 2.
+#: Reason of the choice, as text for the user. The numbers 8 to 26 were measured for random quadratic H and for tops:
+#: the median of |π∇S_3| with the Cayley transform, divided by the median with the exponential. The quotient is 26 on
+#: so(3)*, 8 on se(3)* and 15 on so(4)*. For |π∇S_5| the quotients are 710, 49 and 330. On sl(2)* and gl(2)*, all
+#: quotients are between 0.9 and 2.
 _BETTER = "preferred to the Cayley transform, whose error constants are 8 to 26 times larger on so(3), so(4) and se(3)"
 
 
@@ -40,10 +40,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return a bi-realisation of a linear or affine π, the first that applies.
+    """Return a bi-realisation of a linear or affine π: the first one in a list that applies.
 
-    The candidates are, in this order: the exponential in closed form; a bi-realisation for each block of π; the Cayley
-    transform; the exponential by following paths.
+    The list is: the exponential in closed form; a bi-realisation for each block of π; the Cayley transform; the
+    exponential by following paths.
     """
     candidate = exponential.closed_form(system)
     if candidate is not None:
@@ -62,10 +62,11 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return a bi-realisation of a π that is not linear, affine, constant or log-canonical: the first that applies.
+    """Return a bi-realisation of a π with none of the simpler shapes: the first one in a list that applies.
 
-    The candidates are, in this order: constant π in other coordinates, each a function of one coordinate; the
-    coordinates in which the spec states π; a bi-realisation for each block of π; Karasev's construction.
+    The list is: the bi-realisation ``gauged``, if π is constant in other coordinates, each a function of one
+    coordinate; a bi-realisation in the coordinates in which the spec states π; one for each block of π; Karasev's
+    construction.
     """
     for kind in (_gauged, _pulled_back, _by_blocks):
         candidate = _applicable(kind, system, choice)

@@ -1,7 +1,7 @@
-"""The axioms of a bi-realisation, which are proved for the α and β of each system, not assumed for a kind of
-bi-realisation.
+"""The axioms of a bi-realisation. They are proved for the maps α and β of each system.
 
-With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i on (x, p), the axioms are
+Nothing is assumed because of the kind of a bi-realisation. With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i for
+functions of (x, p), the axioms are
 
     α(x, 0) = β(x, 0) = x,   {α_i, α_j} = π_ij∘α,   {β_i, β_j} = −π_ij∘β,   {α_i, β_j} = 0
 
@@ -32,10 +32,12 @@ Residual = tuple[int, int, Poly]
 
 
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
-    """Return the statements on α and β at p = 0, on their brackets, and on the simplified forms that the solver uses.
+    """Return the statements on α and β at p = 0, on their brackets, and on the simplified forms that the solver
+    uses.
 
-    For a pull-back, the brackets are proved in the other coordinates. If α and β are truncated series in p, which is so
-    for truncations and for steps along paths, brackets are proved up to the degree of the series minus one.
+    For a pull-back, the brackets are proved in the other coordinates. α and β may be truncated series in p: for
+    truncated bi-realisations, and if steps follow paths. Then the brackets are proved up to one degree in p less than
+    the series have.
     """
     if realisation.inner is not None and is_composed(system, realisation):
         return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]
@@ -48,8 +50,9 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """Return the statements on the brackets for the other coordinates of a pull-back; the details name these
-    coordinates."""
+    """Return the statements on the brackets in the other coordinates of a pull-back. Their details name the
+    coordinates.
+    """
     place = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]
 
@@ -74,8 +77,10 @@ def _simplified_forms(system: System, realisation: BiRealisation) -> Statement:
 
 
 def _in_exponentials(e: Expression) -> Expression:
-    """Return the expression with sinh and cosh written in terms of exp, since the ring knows the relations of exp
-    only."""
+    """Return the expression with sinh and cosh written in terms of exp.
+
+    The ring knows relations of exp, but none of sinh and cosh.
+    """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op in ("sinh", "cosh"):
@@ -101,8 +106,8 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
     n = len(alpha)
     pairs = [(i, j) for j in range(n) for i in range(j)]
     pulled = _pulled_back(system, alpha, pairs), _pulled_back(system, beta, pairs)
-    # p ↦ −p changes the sign of every bracket. If it maps α to β, the brackets of β follow from those of α, and half of
-    # the mixed brackets from the other half.
+    # The map p ↦ −p changes the sign of every bracket. If it maps α to β, the axioms for {β_i, β_j} follow from those
+    # for {α_i, α_j}, and the axiom for {α_j, β_i} follows from that for {α_i, β_j}.
     mirrored = realisation.symmetric and is_symmetric(alpha, beta, system.coordinates)
     everything = [*alpha, *beta, *pulled[0], *([] if mirrored else pulled[1])]
     parameters = [s for s in symbols_of(*everything) if s not in variables]

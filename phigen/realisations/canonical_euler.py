@@ -1,7 +1,7 @@
-"""The one-sided bi-realisation of a canonical π, for the symplectic Euler method: α = (q, p + a), β = (q + b, p).
+"""The bi-realisation of the symplectic Euler method, for a canonical π: α = (q, p + a), β = (q + b, p).
 
-(a, b) is the covector at (q, p). With one term S_1 the step is the symplectic Euler method, which is explicit for
-separable H. The bi-realisation is not symmetric; its adjoint exchanges the roles of q and p.
+Here (a, b) is the covector at (q, p). With the single term S_1 the step is the symplectic Euler method, which is
+explicit for separable H. The bi-realisation is not symmetric; its adjoint exchanges the roles of q and p.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ KIND = "canonical-euler"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the one-sided bi-realisation of a canonical π; ``choice.side``, q or p, names the coordinates that α
-    leaves as they are.
+    """Return the bi-realisation of the symplectic Euler method for a canonical π.
 
-    With side q: α = (q, p + a), β = (q + b, p), where (a, b) is the covector at (q, p). With side p: α = (q − b, p), β
-    = (q, p − a). It is not symmetric, so a method of order k needs S_1 … S_k. Coordinates that are Casimirs do not
-    change. Raises `SpecError` unless all other coordinates form canonical pairs.
+    ``choice.side``, q or p, names the coordinates that α leaves unchanged. With side q: α = (q, p + a), β = (q + b, p),
+    where (a, b) is the covector at (q, p). With side p: α = (q − b, p), β = (q, p − a). The bi-realisation is not
+    symmetric, so a method of order k needs S_1 … S_k. Coordinates that are Casimirs do not change. Raises `SpecError`
+    unless all other coordinates form canonical pairs.
     """
     shape = system.shape
     if not isinstance(shape, Canonical):

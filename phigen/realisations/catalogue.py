@@ -31,9 +31,10 @@ from phigen.spec.model import BirealisationChoice
 
 
 def _of_parts(build: Callable[[System, BirealisationChoice, Builder], BiRealisation]) -> Builder:
-    """Return the builder of a kind that is composed of other bi-realisations, such as a product over the blocks of π.
+    """Return the builder of a kind whose bi-realisations are made from others, such as a product over the
+    blocks of π.
 
-    The function ``build`` receives, as its third argument, the builder of the inner kind, which is ``choice.of``.
+    The third argument of ``build`` is the builder of the other bi-realisations, whose kind is ``choice.of``.
     """
 
     def built(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -62,8 +63,9 @@ BUILDERS: dict[str, Builder] = {
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
     """Return the bi-realisation that a spec requests; the default is ``auto``.
 
-    Its axioms are not proved here, but by `phigen.realisations.axioms.check`. Raises `SpecError`, located at
-    ``birealisation`` or ``poisson`` in the spec, for an unknown kind and for a kind that does not apply to the system.
+    The axioms are not proved here; `phigen.realisations.axioms.check` proves them. Raises `SpecError` for an unknown
+    kind and for a kind that does not apply to the system. The error is located at ``birealisation`` or ``poisson`` in
+    the spec.
     """
     choice = choice or BirealisationChoice()
     try:

@@ -1,13 +1,15 @@
 """Bi-realisation of a linear π, on the dual of a Lie algebra, by the Cayley transform.
 
 The transform is τ(P) = (1 − P/2)⁻¹(1 + P/2) for P = Σ p_i E_i, where the matrices E_i are a faithful representation of
-the algebra. Then α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
+the algebra. The coordinates of a matrix of the algebra are its coefficients in the basis E_1, E_2, …, and ⟨x, ·⟩ is the
+scalar product with x. Then α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
 
     α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
 
-This requires that P E_i P lies in the algebra for all P or, equivalently, that E_a E_i E_b + E_b E_i E_a does for all
-a, i, b. The condition holds for so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), but not for sl(3).
-The article `PAPER` in `phigen.realisations.protocol` prints 4 instead of 2 in τ (example so(n)).
+This requires that P E_i P is in the algebra for all P and i. An equivalent condition is that E_a E_i E_b + E_b E_i E_a
+is in the algebra for all a, i, b. The condition holds for so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and
+heisenberg(n), but not for sl(3). In the article `PAPER` of `phigen.realisations.protocol`, example so(n), τ has 4
+instead of 2.
 """
 
 from __future__ import annotations
@@ -34,14 +36,15 @@ from phigen.symbolic.readable import shortened
 KIND = "cayley"
 
 Sparse = dict[tuple[int, int], Scalar]
-#: The form ⟨x, coordinates of P E_i P⟩: (i, a, b, k) with a ≤ b → coefficient of p_a p_b x_k.
+#: The forms ⟨x, coordinates of P E_i P⟩ for all i: (i, a, b, k) with a ≤ b → coefficient of p_a p_b x_k in form i.
 Trilinear = dict[tuple[int, int, int, int], Expression]
 
 
 @dataclass(frozen=True)
 class _Escape:
-    """Indices of a product E_a E_i E_b + E_b E_i E_a that does not lie in the algebra, so that there is no Cayley
-    bi-realisation."""
+    """Indices i, a, b for which E_a E_i E_b + E_b E_i E_a is not in the algebra. Then no Cayley bi-realisation
+    exists.
+    """
 
     i: int
     a: int
@@ -51,8 +54,8 @@ class _Escape:
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return the Cayley bi-realisation of a linear or affine π, which is symmetric.
 
-    Raises `SpecError` if π is neither linear nor affine, or if P E_i P leaves the algebra in every known faithful
-    representation. The message names, for each representation that was tried, a product that leaves the algebra.
+    Raises `SpecError` if π is neither linear nor affine, or if P E_i P is outside the algebra in every known faithful
+    representation. The message names the representations that were tried, with a product outside the algebra for each.
     """
     dual = dual_of(system)
     if dual is None:
@@ -86,9 +89,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
-    """Return a faithful representation of the whole algebra in which P E_i P lies in the algebra for all P = Σ p_a E_a.
-
-    Returns None if no such representation is known.
+    """Return a faithful representation in which P E_i P is in the algebra for all P = Σ p_a E_a; None if none
+    is known.
     """
     declared = [algebra.representation] if algebra.representation else []
     if not declared and len(indecomposable_parts(algebra)) > 1:
@@ -97,7 +99,8 @@ def closed_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
-    """Return the form ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or None if P E_i P leaves the algebra.
+    """Return the forms ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or None if some P E_i P is not in the
+    algebra.
 
     The matrices E_a are those of the ``representation``.
     """
@@ -106,9 +109,9 @@ def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear 
 
 
 def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return a sum of monomials in Horner form, with a coefficient that all terms share up to sign factored out.
+    """Return a sum of monomials in Horner form. A coefficient that all terms share up to sign is factored out.
 
-    For so(3) this gives p_i (p·x), and p·x becomes one node of the expression graph, which all components share.
+    For so(3) the result is p_i (p·x). Then p·x is one node of the expression graph, shared by all components.
     """
     common = next(iter(terms.values()), ONE)
     if any(c is not common and c is not -common for c in terms.values()):
@@ -117,11 +120,10 @@ def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) 
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
-    """Return the form ⟨x, coordinates of P E_i P⟩ of P = Σ p_a E_a, in the first representation where P E_i P lies in
-    the algebra.
+    """Return the forms ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, and a description of the representation.
 
-    The second result describes this representation. Raises `SpecError`, with the representations that were tried, if
-    there is none.
+    The representation is the first one in which P E_i P is in the algebra. If there is none, raises `SpecError` with
+    the representations that were tried.
     """
     failures: dict[str, str] = {}
     if algebra.representation is not None:
@@ -154,8 +156,9 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
-    """Raise `SpecError` if a linear π violates the Jacobi identity; then its structure constants have no
-    representation."""
+    """Raise `SpecError` if a linear π violates the Jacobi identity. No matrices represent its structure
+    constants then.
+    """
     failing = failing_jacobi(algebra)
     if failing is not None:
         triple, component, residual = failing
@@ -173,15 +176,16 @@ def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escap
 
 
 def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
-    """Return the form ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or the first product of matrices that leaves the
-    algebra."""
+    """Return the forms ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or the first product that is not in the
+    algebra.
+    """
     field = Field(v for m in representation.matrices for v in m.values())
     matrices: list[Sparse] = [
         {position: field.convert(v) for position, v in m.items()} for m in representation.matrices
     ]
     span = Span(field, matrices)
     rows = [_by_row(m) for m in matrices]
-    beginning: dict[int, list[int]] = {}  # row → matrices that have nonzero entries in this row
+    beginning: dict[int, list[int]] = {}  # row → indices of the matrices with nonzero entries in this row
     for b, row in enumerate(rows):
         for r in row:
             beginning.setdefault(r, []).append(b)

@@ -1,5 +1,6 @@
-"""Bi-realisation of a constant π: α = x − ½πp, β = x + ½πp. With the single term S_1 it gives the implicit midpoint
-rule."""
+"""Bi-realisation of a constant π: α = x − ½πp, β = x + ½πp. A step with the single term S_1 is the implicit midpoint
+rule.
+"""
 
 from __future__ import annotations
 

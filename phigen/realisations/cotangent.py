@@ -1,9 +1,9 @@
-"""Exterior calculus on T*U with polynomials, for Poisson sprays and Moser's trick.
+"""Exterior calculus with polynomials on T*U, the set of all (x, p), for Poisson sprays and Moser's trick.
 
 The variables are z = (x_1, …, x_n, p_1, …, p_n). The canonical form is ω = Σ dx_i ∧ dp_i, so that {x_i, p_j} = δ_ij.
-The *weight* of a form is the number of its factors p and dp: its eigenvalue under the Euler field E = Σ p_i ∂_{p_i}.
-The form ω has weight 1. The Lie derivative along a spray raises weights by 1. Functions and forms are stored as lists
-of parts, each of one weight.
+The *weight* of a form is the number of its factors p and dp, that is its eigenvalue under the Lie derivative along the
+Euler field E = Σ p_i ∂_{p_i}. So ω has weight 1. The Lie derivative along a spray raises weights by 1. A function or
+form is stored as a dictionary: weight → the part of this weight.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ GradedForm = dict[int, TwoForm]
 class Cotangent:
     """The ring of functions on T*U that contains some expressions and all their derivatives in x and p.
 
-    ``size`` is n. Variable number a < n is x_a, and variable number n + i is p_i. Parameters are symbols of the ring
-    too.
+    ``size`` is n. Variable number a < n is x_a, and variable number n + i is p_i. Parameters are further symbols of the
+    ring.
     """
 
     def __init__(self, coordinates: Sequence[str], expressions: Sequence[Expression]) -> None:
@@ -41,7 +41,7 @@ class Cotangent:
     # -- functions --------------------------------------------------------------------------------
 
     def along(self, field: Components, f: Poly) -> Poly:
-        """Return the derivative of f along a field Y: L_Y f = Σ Y_a ∂_a f."""
+        """Return the derivative L_Y f = Σ Y_a ∂_a f of a function f along a vector field Y."""
         return self.tower.combine(
             y * d for y, name in zip(field, self.names, strict=True) if y != 0 and (d := self.derivative(f, name)) != 0
         )
@@ -61,7 +61,7 @@ class Cotangent:
         return {(i, self.size + i): self.tower.constant(1) for i in range(self.size)}
 
     def contract(self, field: Components, form: TwoForm) -> Components:
-        """Return the contraction ι_Y w of a field Y and a 2-form w: Σ w_ab (Y_a dz_b − Y_b dz_a)."""
+        """Return the contraction ι_Y w = Σ w_ab (Y_a dz_b − Y_b dz_a) of a 2-form w with a vector field Y."""
         result = [self.tower.zero] * len(self.names)
         for (a, b), w in form.items():
             result[b] = result[b] + w * field[a]
@@ -81,7 +81,7 @@ class Cotangent:
         return {key: w for key, w in result.items() if w != 0}
 
     def lie(self, field: Components, form: TwoForm) -> TwoForm:
-        """Return the Lie derivative of a closed 2-form along a field Y, which is d ι_Y of the form."""
+        """Return the Lie derivative L_Y w = d ι_Y w of a closed 2-form w along a vector field Y."""
         return self.exterior(self.contract(field, form))
 
     def vanishes(self, form: TwoForm) -> bool:
@@ -89,7 +89,7 @@ class Cotangent:
         return all(self.tower.is_zero(w) for w in form.values())
 
     def sum(self, forms: Iterable[tuple[Fraction, TwoForm]]) -> TwoForm:
-        """Return the linear combination of some 2-forms, given as pairs (factor, form)."""
+        """Return a linear combination of 2-forms, given as pairs (factor, form)."""
         result: TwoForm = {}
         for factor, form in forms:
             for key, w in form.items():
@@ -102,5 +102,7 @@ class Cotangent:
         return [self.tower.zero] * self.size + self.variables[self.size :]
 
     def dual(self, form: Components) -> Components:
-        """Return the field Y with ι_Y ω = λ for a 1-form λ: its x components are λ_p, its p components −λ_x."""
+        """Return the vector field Y with ι_Y ω = λ for a 1-form λ. The x components of Y are λ_p, its p components
+        −λ_x.
+        """
         return [*form[self.size :], *(-f for f in form[: self.size])]

@@ -1,16 +1,17 @@
-"""The even part of b(M_p)x − x, with b(z) = z/(1 − e^{−z}), in closed form: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x with
-Bernoulli numbers B.
+"""The even part of b(M_p)x − x, with b(z) = z/(1 − e^{−z}), in closed form.
 
-M = M_p is the matrix with M_p x = π(x)p on the dual of a Lie algebra. Let N = M², and let φ be the function of
-`phigen.symbolic.special`. Then Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), and the even part has these closed forms:
+On the dual of a Lie algebra, M = M_p is the matrix with M_p x = π(x)p. The even part is Σ_{k≥1} B_{2k}/(2k)! M^{2k} x
+with Bernoulli numbers B. Let N = M², and let φ be the function of `phigen.symbolic.special`. Then the even part is
+Nφ(−N)x. It has these closed forms:
 
     N^k x = 0 for some k     a finite sum
     N(N + s) = 0             N x φ(s)
     N(N + s)² = 0            N (φ(s) x − φ'(s)(N + s) x)
 
-In the last case φ(−N) = φ(s) − φ'(s)(N + s) up to terms with (N + s)², which N annihilates. s is a quadratic polynomial
-in p: s = |p|² for so(3), where Nx = p×(p×x); minus the discriminant for sl(2); the squared rotation rate for se(3). s
-follows from the structure constants: if −s is the only nonzero eigenvalue of N, with multiplicity m, then s = −tr N/m.
+In the last case φ(−N) = φ(s) − φ'(s)(N + s) plus terms with the factor (N + s)², whose product with N is 0. The number
+s is a quadratic polynomial in p. For so(3), where Nx = p×(p×x), it is |p|²; for sl(2), minus the discriminant; for
+se(3), the squared rotation rate. It follows from the structure constants: if −s is the only nonzero eigenvalue of N,
+and m is its multiplicity, then s = −tr N/m.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import sample_point
 
-#: Largest number of terms, in p and x, of a component of M_p^k x for which a closed form is tried.
+#: Largest number of terms, as polynomials in p and x, of the components of M_p^k x. For larger components no closed
+#: form is tried.
 MOST_TERMS = 20_000
 
 Vector = list[Expression]
@@ -51,11 +53,11 @@ class EvenPart:
 
 
 def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
-    """Return the even part of b(M_p)x − x with b(z) = z/(1 − e^{−z}) in closed form; None if no formula of this module
+    """Return the even part of b(M_p)x − x with b(z) = z/(1 − e^{−z}) in closed form; None if no formula here
     applies.
 
-    x is in the dual of the algebra, p in the algebra, and M_p x = π(x)p. Both x and p may have any expressions as
-    components; for instance, constants for a central extension. Each summand of a direct sum of algebras has its own
+    The vector x is in the dual of the algebra, p is in the algebra, and M_p x = π(x)p. The components of x and p may be
+    any expressions; for a central extension, some are constants. Each summand of a direct sum of algebras has its own
     closed form.
     """
     values: Vector = [ZERO] * algebra.dimension
@@ -72,11 +74,12 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
 
 
 def _parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Return ideals of the algebra that commute with each other, as lists of indices of the basis elements that span
-    them.
+    """Return ideals of the algebra that commute with each other. An ideal is a list of indices of basis elements that
+    span it.
 
-    Together they contain all basis elements with nonzero brackets. All other basis elements are left out, since M_p x
-    has no component along them. Ideals may share central elements, such as the last one of a central extension.
+    Each basis element that has nonzero brackets is in one of the ideals. All other basis elements are left out, since
+    M_p x has no component along them. Ideals may share central elements, such as the last one of a central
+    extension.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
@@ -86,8 +89,7 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
-    """Return the closed form on an ideal that basis elements span: one for the whole ideal, or one for each direct
-    summand.
+    """Return the closed form on an ideal that basis elements span, or on each direct summand of the ideal.
 
     The direct summands need not be spanned by basis elements.
     """
@@ -97,7 +99,7 @@ def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None
-    # For the projections e_a onto the summands, M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
+    # Let e_a be the projections onto the summands. Then M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
     summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
     closed_summands = [s for s in summands if s is not None]
     if len(closed_summands) < len(summands):
@@ -137,7 +139,7 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
-    """Return the s such that 0 and −s are the only eigenvalues of M², if its traces allow such an s; else None."""
+    """Return s if 0 and −s may be the only eigenvalues of M², by the traces of M² and M⁴; else None."""
     n = range(len(matrix))
     if not _may_have_root(matrix):
         return None
@@ -155,8 +157,8 @@ def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
 def _may_have_root(matrix: Sequence[Vector]) -> bool:
     """Whether (tr M²)² = k tr M⁴ for some k = 1, …, n at a sample point, where n is the number of rows of M.
 
-    If M² has a single nonzero eigenvalue, this holds, and k is its multiplicity. The test comes first, since symbolic
-    squares of large matrices take long.
+    The equation holds if M² has a single nonzero eigenvalue, whose multiplicity is k. This test comes before the
+    symbolic one, since symbolic squares of large matrices take long.
     """
     flat, n = [e for row in matrix for e in row], len(matrix)
     try:
@@ -173,7 +175,7 @@ def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | 
     power = times(matrix, x)
     for k in range(len(matrix)):
         power = times(matrix, power)
-        if k % 2 == 0:  # power is N^{k/2+1} x with N = M²
+        if k % 2 == 0:  # here power = N^{k/2+1} x with N = M²
             if _vanish(tower, power):
                 break
             terms.append([number((-1) ** (k // 2) * coefficient(0, k // 2)) * v for v in power])

@@ -5,10 +5,10 @@ With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
     α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
 
 No matrix representation is needed. For linear π this is Karasev's construction. Steps are exact if H is linear, since
-then S_t = tH. On so(3), so(4) and se(3) the error constants of the exponential are 8 to 700 times smaller than those of
-the Cayley transform. An affine π, given by a Lie algebra with a cocycle, is treated as the hyperplane z = 1 in the dual
-of the central extension. b(M_p)x is written in closed form where `phigen.realisations.even_part` has a formula;
-otherwise the solver follows the path ṁ = π(m)p numerically.
+the generating function for the time t is then tH. On so(3), so(4) and se(3) the error constants of the exponential are
+8 to 700 times smaller than those of the Cayley transform. An affine π comes from a Lie algebra with a cocycle; the
+coordinates are then the hyperplane z = 1 in the dual of the central extension. b(M_p)x is written in closed form if
+`phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ = π(m)p numerically.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ REFERENCE = f"{PAPER}, the proposition on Lie–Poisson structures, with τ = ex
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the exponential bi-realisation of a linear or affine π, which is symmetric: in closed form, or by paths.
+    """Return the exponential bi-realisation of a linear or affine π, which is symmetric.
 
-    Raises `SpecError` if π is neither linear nor affine.
+    It is in closed form if phigen knows one; otherwise the solver follows paths. Raises `SpecError` if π is neither
+    linear nor affine.
     """
     closed = closed_form(system)
     if closed is not None:
@@ -43,8 +44,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_form(system: System) -> BiRealisation | None:
-    """Return the exponential bi-realisation in closed form; None if π is neither linear nor affine, or no closed form
-    is known."""
+    """Return the exponential bi-realisation in closed form; None if phigen knows none, or if π is neither linear nor
+    affine.
+    """
     dual = dual_of(system)
     even = even_part(dual.algebra, dual.x, dual.p) if dual else None
     if even is None:
@@ -76,8 +78,9 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
 
 
 def followed(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the exponential bi-realisation without a closed form: the solver follows the path ṁ = π(m)p, where p is
-    constant."""
+    """Return the exponential bi-realisation without a closed form. The solver follows the path ṁ = π(m)p with constant
+    p.
+    """
     from phigen.realisations import karasev
 
     path = karasev.build(system, choice)

@@ -1,16 +1,18 @@
-"""Bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A: the one of a constant π, in other coordinates.
+"""Bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j) with a constant matrix A.
 
-In the coordinates y_i = ∫ dx_i/g_i(x_i), π is A and the covector is g_i(x_i)p_i. With u_i = Σ_j A_ij g_j(x_j)p_j,
+In the coordinates y_i = ∫ dx_i/g_i(x_i), π is the constant A, and the covector is g_i(x_i)p_i. The bi-realisation of
+this constant π is transformed to the coordinates x. With u_i = Σ_j A_ij g_j(x_j)p_j,
 
     α_i = the flow of ẋ = g_i(x) from x_i for the time −½u_i,    β_i = the same flow for the time ½u_i.
 
-For these g the flow for the time t is elementary, and written without cancellation:
+For the following functions g, the flow for the time t is elementary, and the formula has no cancellation:
 
-- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac; with tan if w² is negative; if the
-  sign depends on parameters, T = t/(1 − sφ(s)) with s = −4w²t² and φ as in `phigen.symbolic.special`
-- bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical bi-realisation for c = 0
-- c e^{kx}: x − log(1 − kt g(x))/k
-- c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}
+- g = ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac. If w² is negative, tan and √−w²
+  replace tanh and w. If the sign of w² depends on parameters, T = t/(1 − sφ(s)) with s = −4w²t² and φ as in
+  `phigen.symbolic.special`
+- g = bx + c: x + g(x)(e^{bt} − 1)/b; for c = 0 this gives the log-canonical bi-realisation
+- g = c e^{kx}: x − log(1 − kt g(x))/k
+- g = c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}
 """
 
 from __future__ import annotations
@@ -34,8 +36,10 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class _Motion:
-    """The components of α − x (``early``), β − x (``late``) and β − α (``increment``) for one coordinate, without
-    cancellation."""
+    """The components of α − x (``early``), β − x (``late``) and β − α (``increment``) for one coordinate.
+
+    All are written without cancellation.
+    """
 
     early: Expression
     late: Expression
@@ -83,8 +87,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> _Motion | None:
     """Return the components of α − x, β − x and β − α for the coordinate ``c``.
 
-    They are the increments of c along ẋ = g(x) for the times −½u and ½u, and the difference. Returns None if phigen
-    knows no formula for this flow.
+    The first two are the increments of c along ẋ = g(x) for the times −½u and ½u; the third is their difference.
+    Returns None if phigen knows no formula for this flow.
     """
     if u.is_zero:
         return _Motion(ZERO, ZERO, ZERO)
@@ -118,7 +122,7 @@ def _quadratic(
     positive: Collection[str],
 ) -> _Motion:
     a, b, c = coefficients
-    squared = _simplified((b**2 - 4 * a * c) / 4)  # w² of the flow of ax² + bx + c
+    squared = _simplified((b**2 - 4 * a * c) / 4)  # w² in the flow of ẋ = ax² + bx + c
     tilt = a * x + b / 2
     if not (squared.is_number or _is_positive(squared, positive)):
         s = -(squared * u**2)
@@ -154,8 +158,7 @@ def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> 
 
 
 def _constant(e: Expression, c: str) -> Expression | None:
-    """Return an expression that does not depend on the coordinate ``c`` in a form without ``c``; None if it depends on
-    ``c``."""
+    """Return an expression in a form without the coordinate ``c``; None if the expression depends on ``c``."""
     simple = _simplified(e)
     return None if c in symbols_of(simple) else simple
 

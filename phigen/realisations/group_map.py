@@ -1,14 +1,14 @@
-"""Bi-realisation of a linear π by a map τ from the Lie algebra to its group, close to the exponential, which the spec
-states.
+"""Bi-realisation of a linear π by a map τ from the Lie algebra to its group. The spec states τ.
 
-With matrices E_i and P = Σ p_i E_i, the right and left trivialised derivatives R and L of τ are defined by (∂τ/∂p_j)
-τ⁻¹ = Σ_k R_kj E_k and τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
+Let the matrices E_i be a basis of the algebra. τ is a function of P = Σ p_i E_i, or of the p_i, and agrees with e^P to
+first order at p = 0. Its right and left trivialised derivatives R and L are defined by (∂τ/∂p_j) τ⁻¹ = Σ_k R_kj E_k and
+τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
 
     β = R^{−T} x,    α = L^{−T} x.
 
-Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ. Column i of L⁻¹ solves the same equation with τ E_i on the right
-side. The bi-realisation is symmetric if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) it is the
-bi-realisation of the kind ``cayley``.
+Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ. Column i of L⁻¹ solves the same equation with τ E_i on the
+right-hand side. The bi-realisation is symmetric if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) it equals
+the bi-realisation of the kind ``cayley``.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return the bi-realisation of a linear π by the map τ in ``choice.tau``.
 
     τ is a rational function of the symbol `MATRIX`, or a matrix of expressions in the symbols ``p:NAME``. Raises
-    `SpecError` if π is not linear, no faithful matrices are known, τ(0) ≠ 1, dτ(0) ≠ id, or the derivative of τ leaves
-    the algebra.
+    `SpecError` if π is not linear, if no faithful matrices are known, if τ(0) is not 1 or dτ(0) not the identity, and
+    if the derivative of τ is not in the algebra.
     """
     if not isinstance(system.shape, LiePoisson):
         raise refuse(f"birealisation {KIND} needs a linear π, the dual of a Lie algebra; this π is {system.shape}")
@@ -112,8 +112,7 @@ def _matrix(system: System, representation: Representation, tau: Expression | Se
 
 
 def _expect_tangent(system: System, representation: Representation, tau: Matrix) -> None:
-    """Raise `SpecError` unless the map τ of the spec satisfies τ(0) = 1 and ∂τ/∂p_j = E_j at p = 0, with the matrices
-    E_j."""
+    """Raise `SpecError` unless the map τ of the spec satisfies τ(0) = 1 and, at p = 0, ∂τ/∂p_j = E_j."""
     size, zero = representation.size, dict.fromkeys(covector_names(system.coordinates), ZERO)
     try:
         at_zero = [substitute(row, zero) for row in tau]
@@ -136,10 +135,10 @@ def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
 
 
 class _Trivialised:
-    """Solver of the linear equations for R⁻¹ and L⁻¹, where R and L are the right and left trivialised derivatives of
-    the map τ.
+    """Solver of the linear equations for R⁻¹ and L⁻¹.
 
-    The equations are solved by elimination, with rational functions of p and of the functions of p that occur in τ.
+    R and L are the right and left trivialised derivatives of the map τ. The equations are solved by elimination, with
+    rational functions of p and of the functions of p that occur in τ.
     """
 
     def __init__(self, system: System, representation: Representation, tau: Matrix) -> None:
@@ -152,9 +151,10 @@ class _Trivialised:
         self._columns = [[self._field.convert(e) for row in m for e in row] for m in slopes]
 
     def solved(self, *, left: bool) -> list[list[Expression]]:
-        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows; R and L are the trivialised derivatives of the map τ.
+        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows; R and L are the trivialised derivatives of the
+        map τ.
 
-        Column i has the coefficients with which the ∂τ/∂p_j add up to E_i τ or, for L⁻¹, to τ E_i.
+        The entries c_j of column i solve Σ_j (∂τ/∂p_j) c_j = E_i τ. For L⁻¹ the right-hand side is τ E_i.
         """
         n = len(self._basis)
         sides = []
@@ -168,8 +168,8 @@ class _Trivialised:
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
         """Return the rows of the equations with the first n columns reduced to the identity.
 
-        Raises `SpecError` if the derivative of the map τ is singular, or if the equations have no solution because it
-        leaves the algebra.
+        Raises `SpecError` if the derivative of the map τ is singular. Also raises `SpecError` if the equations have no
+        solution; the derivative is then not in the algebra.
         """
         reduced: list[list[Scalar]] = []
         for k in range(n):

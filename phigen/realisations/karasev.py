@@ -2,11 +2,12 @@
 
 Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with constant p. Then α is the start of this path, β its end, and x its mean ∫₀¹ m
 dt. A step from the state x₀ solves p = ∇S_h(mean of the path that starts at x₀) for p; the new state is the end of this
-path. The path is part of the flow of the linear Hamiltonian p·x, so it stays on its symplectic leaf for every p. If the
+path. The path is a trajectory of the linear Hamiltonian p·x, so it stays on its symplectic leaf for every p. If the
 path is exact to round-off, the step is a Poisson map to round-off.
 
-The S_i are computed from formal series. The series of the mean is Σ D^j x/(j+1)! with D = Σ (πp)_a ∂_a. Its inversion
-gives α up to degree k − 1 in p, as S_1 … S_k require. For linear π this is the exponential bi-realisation.
+The S_i are computed from formal series. The mean of the path that starts at x is Σ D^j x/(j+1)! with D = Σ (πp)_a ∂_a.
+α is the inverse of the map from x to this mean. S_1 … S_k require α up to degree k − 1 in p. For linear π this is the
+exponential bi-realisation.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from phigen.symbolic.expression import ZERO, Expression, derivatives, number, su
 
 KIND = "karasev"
 
-#: Degree in p of the formal series `BiRealisation.alpha`. It is sufficient for S_1 … S_3, and hence for order 4.
+#: Degree in p of the formal series `BiRealisation.alpha`. The degree 2 suffices for S_1 … S_3, and hence for order 4.
 DEGREE = 2
 
 
 def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) -> BiRealisation:
     """Return the bi-realisation of any smooth π, for a solver that follows paths.
 
-    It is symmetric, since reversing a path exchanges α and β. ``alpha`` is a series that is correct up to ``degree`` in
-    p.
+    The bi-realisation is symmetric, since reversing a path exchanges α and β. ``alpha`` is a series that is correct up
+    to ``degree`` in p.
     """
     alpha = series(system, degree)
     mirrored = substitute(alpha, {s.value: -s for s in covector_symbols(system.coordinates)})
@@ -51,11 +52,11 @@ def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) 
 
 
 def series(system: System, degree: int) -> list[Expression]:
-    """Return α(x, p) as a series that is correct up to a degree in p; terms of higher degree in the result must not be
-    used.
+    """Return α(x, p) as a series that is correct up to ``degree`` in p. The result has terms of higher degree, which
+    are wrong.
 
-    α is defined by: the path ṁ = π(m)p that starts at α has the mean x. So α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!,
-    where D is the derivative along πp. This equation is solved by repeated substitution.
+    The path ṁ = π(m)p that starts at α has the mean x. Therefore α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)! up to this
+    degree, where D is the derivative along πp. The equation is solved by repeated substitution.
     """
     coordinates = system.coordinates
     x: list[Expression] = [symbol(c) for c in coordinates]
@@ -65,7 +66,7 @@ def series(system: System, degree: int) -> list[Expression]:
         powers.append(_derivatives_along_flow(powers[-1], coordinates, flow))
     approximations = [x]  # approximations[d]: α, correct up to degree d in p
     for order in range(1, degree + 1):
-        # D^j x has degree j in p, so the α that is substituted in it need be correct up to degree order − j only.
+        # D^j x has degree j in p. So it suffices to substitute an α that is correct up to degree order − j.
         shifts = [
             substitute(powers[j - 1], dict(zip(coordinates, approximations[order - j], strict=True)))
             for j in range(1, order + 1)

@@ -19,11 +19,10 @@ KIND = "log-canonical"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j; it is symmetric and defined for all
-    (x, p).
+    """Return the bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j. It is symmetric.
 
-    β − α is −2 x_j sinh(½u_j) with u_j = Σ_i a_ij x_i p_i, written without cancellation for small u_j. Raises
-    `SpecError` if π is not log-canonical.
+    The maps are defined for all (x, p). β − α is −2 x_j sinh(½u_j) with u_j = Σ_i a_ij x_i p_i, written without
+    cancellation for small u_j. Raises `SpecError` if π is not log-canonical.
     """
     if not isinstance(system.shape, LogCanonical):
         raise refuse(f"birealisation {KIND} needs {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try auto")

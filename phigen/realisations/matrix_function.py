@@ -25,7 +25,8 @@ def multiplied(a: Matrix, b: Matrix) -> Matrix:
 
 
 class MatrixFunction(Arithmetic[Matrix]):
-    """Evaluation of an expression at a matrix P; numbers and parameters in it stand for multiples of the identity.
+    """Evaluation of an expression at a matrix P. A number or parameter c in the expression stands for the
+    matrix c·1.
 
     All values are functions of P and therefore commute, so left and right quotients are equal.
     """

@@ -1,14 +1,15 @@
 """Moser's trick by recursion: a map ψ of T*U with ψ*Ω = ω that is the identity to first order at p = 0.
 
-Ω = ω + Ω₃ + Ω₅ + … is a closed 2-form. Its part Ω_w has the weight w, the number of factors p and dp
-(`phigen.realisations.cotangent`). The part Ω_w of lowest weight w > 1 has the primitive λ = ι_E Ω_w / w, since L_E Ω_w
-= w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
+T*U is the set of all (x, p), and ω = Σ dx_i ∧ dp_i. The closed 2-form Ω is a sum ω + Ω₃ + Ω₅ + …, in which Ω_w has the
+weight w: the number of factors p and dp (`phigen.realisations.cotangent`). Let w > 1 be the lowest weight with Ω_w ≠ 0.
+The 1-form λ = ι_E Ω_w / w, with the Euler field E, is a primitive of Ω_w, since w Ω_w = L_E Ω_w = d ι_E Ω_w. Let Y be
+the vector field with ι_Y ω = −λ. Then
 
     exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w).
 
-Repetition gives ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates one
-field that depends on a time. The recursion reaches the same normal form by a sequence of homogeneous fields, one for
-each weight.
+Repetition gives ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates a
+single field, which depends on a time. The recursion reaches the same normal form by a sequence of homogeneous fields,
+one for each weight.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from phigen.realisations.cotangent import Components, Cotangent, GradedForm, Gra
 
 @dataclass(frozen=True)
 class Step:
-    """A factor exp(Y) of the map ψ of Moser's trick, where the vector field Y raises weights by ``weight``."""
+    """A factor exp(Y) of the map ψ in Moser's trick. The vector field Y raises weights by ``weight``."""
 
     weight: int
     field: Components
 
 
 def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
-    """Return the factors exp(Y) of a map ψ with ψ*Ω = ω up to the weight ``top``, for a 2-form Ω and the canonical form
-    ω.
+    """Return the factors exp(Y) of a map ψ with ψ*Ω = ω up to the weight ``top``, where ω is the canonical
+    form.
 
-    The factors are in the order in which functions are pulled back. ``forms`` has the parts of Ω by weight: ω at weight
-    1, and parts of odd weight. Parts that vanish give no factor.
+    The factors are in the order in which `pulled_back` applies them. ``forms`` has the parts of the 2-form Ω by weight:
+    ω at weight 1, and parts of odd weight. Parts that vanish give no factor.
     """
     steps = []
     for weight in range(3, top + 1, 2):
@@ -48,8 +49,9 @@ def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
 
 
 def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
-    """Return the pull-back exp(Y)*Ω of a 2-form Ω up to the weight ``top``. ``forms`` has the parts of Ω, and ``step``
-    is the factor exp(Y) of Moser's trick.
+    """Return the pull-back exp(Y)*Ω of a 2-form Ω up to the weight ``top``.
+
+    ``forms`` has the parts of Ω by weight, and ``step`` is the factor exp(Y) of Moser's trick.
     """
     result: GradedForm = {}
     for weight, form in forms.items():
@@ -65,7 +67,8 @@ def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> G
 
 
 def pulled_back(space: Cotangent, f: GradedFunction, steps: Sequence[Step], top: int) -> GradedFunction:
-    """Return the function f pulled back by a map ψ up to the weight ``top``; ``steps`` are the factors exp(Y) of ψ.
+    """Return the pull-back of the function f by a map ψ, up to the weight ``top``. ``steps`` are the factors exp(Y) of
+    ψ.
 
     Each exp(Y) acts on functions by the Lie series of Y.
     """

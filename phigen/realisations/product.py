@@ -18,8 +18,8 @@ KIND = "product"
 def build(system: System, choice: BirealisationChoice, build_part: Builder) -> BiRealisation:
     """Return the product of the bi-realisations that ``build_part`` makes for the blocks of π.
 
-    Raises `SpecError` if π has only one block, or if the kind does not apply to a block. Also raises it if the solver
-    would have to follow a path for a block, since a path can be followed for the whole system only.
+    Raises `SpecError` if π has only one block, if the kind does not apply to a block, or if the solver would have to
+    follow a path for a block. A path can be followed for the whole system only.
     """
     parts = grouped(system)
     if len(parts) < 2:
@@ -30,7 +30,7 @@ def build(system: System, choice: BirealisationChoice, build_part: Builder) -> B
 
 
 def grouped(system: System) -> list[System]:
-    """Return a system with H = 0 for each block of π; all blocks with constant π are put together in one system."""
+    """Return a system with H = 0 for each block of π. The blocks with constant π form one system together."""
     single = [block_of(system, indices) for indices in blocks(system.coordinates, system.poisson)]
     constant = [b for b in single if isinstance(b.shape, Constant | Canonical)]
     if len(constant) < 2:

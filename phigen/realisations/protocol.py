@@ -25,16 +25,16 @@ class BiRealisation:
     All tuples have one expression for each coordinate, in the symbols NAME (x), ``momentum(NAME)`` (its covector) and
     the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
 
-    - ``displacement``: α − x, simplified such that no terms of the size of x cancel
-    - ``increment``: β − α, simplified in the same way
+    - ``displacement``: α − x, in a form in which no terms of the size of x cancel
+    - ``increment``: β − α, in a form with the same property
     - ``symmetric``: whether β(x, p) = α(x, −p), which is proved
-    - ``exact``: false for a truncated series, whose steps are Poisson maps only up to the order of the method
+    - ``exact``: false for a truncated series. Its steps are Poisson maps only up to a power of the step size
     - ``degree``: for a truncated series, the degree in p up to which α and β are correct; their brackets are correct up
       to one degree less
-    - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction); then ``alpha`` and ``beta`` are
-      truncated series, from which the S_i are computed, and are never evaluated in a step
-    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation, for which the axioms are
-      proved
+    - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction). Then ``alpha`` and ``beta`` are
+      truncated series; the S_i are computed from these, but no step evaluates them
+    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation; the axioms are proved
+      there
     - ``explanation``: the chosen form and the reason, for the user; ``reference``: the source of the formulas
     """
 
@@ -65,8 +65,8 @@ class BiRealisation:
         return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")
 
 
-#: Type of the functions that build the bi-realisation of a system, or raise `SpecError` if the kind does not apply to
-#: it.
+#: Type of the functions that build the bi-realisation of a system. They raise `SpecError` if their kind does not apply
+#: to the system.
 Builder = Callable[[System, BirealisationChoice], BiRealisation]
 
 
@@ -97,7 +97,9 @@ def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordi
 
 
 def simplified_differences(left: Sequence[Expression], right: Sequence[Expression]) -> tuple[Expression, ...]:
-    """Return left − right for each component, in the normal form of a polynomial ring if that has fewer operations."""
+    """Return left − right for each component. The normal form in a polynomial ring is taken if it has fewer
+    operations.
+    """
     roots = [a - b for a, b in zip(left, right, strict=True)]
     tower = Tower(symbols_of(*roots), roots)
     images = [tower.expression(element) for element in tower.convert_all(roots)]

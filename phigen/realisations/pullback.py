@@ -1,7 +1,7 @@
-"""Bi-realisation of a π that a spec states in other coordinates y = ψ(x), where it is simpler.
+"""Bi-realisation of a π that a spec states in other coordinates y = ψ(x), in which π is simpler.
 
 Let α_y be the map α in the coordinates y, and q_a = Σ_i p_i ∂x_i/∂y_a the covector in these coordinates. Then α(x, p) =
-ψ⁻¹(α_y(ψ(x), q)), in short α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹, and likewise for β.
+ψ⁻¹(α_y(ψ(x), q)), in short α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹. β is transformed in the same way.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
     """Return the bi-realisation of a π that the spec states in other coordinates y, as maps in the coordinates x of the
     spec.
 
-    ``build_inner`` makes the bi-realisation in the coordinates y. Raises `SpecError` unless the spec states π as a
+    ``build_inner`` makes the bi-realisation in the coordinates y. Raises `SpecError` if the spec does not state π as a
     pull-back, and if the bi-realisation in the coordinates y is truncated or follows paths.
     """
     form = system.form
@@ -62,8 +62,8 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
     """Whether α and β are the maps of ``realisation.inner``, transformed from the coordinates y = ψ(x) to those of the
     spec.
 
-    The inverse ψ⁻¹ is proved too. Then the axioms for α and β follow from the axioms in the coordinates y, since the
-    lift of ψ to (x, p) is symplectic.
+    If so, the axioms for α and β follow from the axioms in the coordinates y, since the lift of ψ to (x, p) is
+    symplectic. That ψ⁻¹ is the inverse of ψ is proved by `change_of_coordinates`.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False
@@ -78,8 +78,7 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
 def moved(
     system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
 ) -> tuple[Expression, ...]:
-    """Return a map α or β that is given in the coordinates y = ψ(x) as a map in the coordinates x: ψ⁻¹ ∘ map ∘
-    T*ψ⁻¹."""
+    """Return the map ψ⁻¹ ∘ map ∘ T*ψ⁻¹ in the coordinates x, for a map α or β in the coordinates y = ψ(x)."""
     p = covector_symbols(system.coordinates)
     covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
     substitution = dict(zip(form.coordinates, change.forward, strict=True))

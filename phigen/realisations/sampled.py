@@ -21,28 +21,32 @@ from phigen.symbolic.numeric import DomainError, evaluate_exactly, is_rational
 from phigen.symbolic.tower import rational
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement, sample_point
 
-#: Number of points at which the axioms are checked, and largest number of points that are tried, as not all are in the
-#: domain.
+#: Number of points at which the axioms are checked, and largest number of points that are tried. Points outside the
+#: domain are skipped.
 POINTS, ATTEMPTS = 3, 16
 
 Point = Mapping[str, Fraction]
 
 
 def is_large(system: System, realisation: BiRealisation) -> bool:
-    """Whether the brackets of α and β are only checked at points: a proof would take too long, and all functions are
-    rational."""
+    """Whether the brackets of α and β are checked at points instead of being proved.
+
+    This is so if all functions are rational and a proof would take too long.
+    """
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
-    # Estimated number of products: for all i and j, each term of α_i is multiplied by the derivatives of α_j with
-    # respect to n pairs (x_k, p_k).
+    # Estimated number of products: each term of each α_i is multiplied by the derivatives of each α_j with respect to
+    # x_k and p_k, for n values of k.
     sizes = sum(len(topological([e])) for e in realisation.alpha)
     return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
 
 
 def brackets_at_points(system: System, realisation: BiRealisation, titles: Sequence[str]) -> Iterator[Statement]:
-    """Yield the statements on the brackets {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, checked at points; ``titles`` are
-    their names."""
+    """Yield the statements on the brackets {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, checked at points.
+
+    ``titles`` are the names of the statements.
+    """
     maps = realisation.alpha, realisation.beta
     variables = [*system.coordinates, *covector_names(system.coordinates)]
     slopes: tuple[list[list[Expression]], ...] = ([], [])
@@ -84,7 +88,8 @@ def _failures(
     slopes: tuple[list[list[Expression]], ...],
     point: Point,
 ) -> list[str]:
-    """Return for each of {α_i, α_j}, {β_i, β_j} and {α_i, β_j} a text about a pair whose bracket is wrong at a point.
+    """Return three texts, for {α_i, α_j}, {β_i, β_j} and {α_i, β_j}: each names a pair whose bracket is wrong at a
+    point.
 
     The text is "" if the brackets of all pairs are right. ``slopes`` are the derivatives of α and β.
     """
@@ -107,13 +112,13 @@ def _failures(
 
 
 def _halves(rows: list[list[Fraction]]) -> tuple[Any, Any]:
-    """Return the derivatives with respect to x and those with respect to p as two matrices."""
+    """Return two matrices: the derivatives with respect to x, and those with respect to p."""
     n = len(rows)
     return _matrix([row[:n] for row in rows]), _matrix([row[n:] for row in rows])
 
 
 def _tensor(system: System, maps: Sequence[Expression], point: Point) -> Any:
-    """Return the matrix π at the point to which ``maps``, α or β, take a point (x, p)."""
+    """Return the matrix π at the image of a point (x, p) under ``maps``, which are the components of α or of β."""
     image = dict(zip(system.coordinates, evaluate_exactly(maps, point), strict=True))
     values = iter(evaluate_exactly([e for row in system.poisson for e in row], {**point, **image}))
     return _matrix([[next(values) for _ in row] for row in system.poisson])

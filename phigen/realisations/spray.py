@@ -1,19 +1,20 @@
 """Poisson sprays and Moser's trick: a bi-realisation from the flow Φ of a vector field X on T*U.
 
-The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadratic in p. Let ω = Σ dx_i ∧ dp_i and τ(x, p) = x.
-The article `PAPER` in `phigen.realisations.protocol`, section "Poisson Spray and Moser's trick", has α̅ = τ, β̅ = τ∘Φ¹,
-Ω = ∫₀¹ Φˢ*ω ds, and a map ψ with ψ*Ω = ω; then α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
+T*U is the set of all (x, p). The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadratic in p. Let ω = Σ
+dx_i ∧ dp_i, and τ(x, p) = x. The article `PAPER` in `phigen.realisations.protocol`, section "Poisson Spray and Moser's
+trick", has α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and a map ψ with ψ*Ω = ω. Then α = α̅∘ψ and β = β̅∘ψ. phigen takes ψ =
+Φ^{−½}∘ψ₀ with a map ψ₀, so that
 
     α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
 
-The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. ψ
-is not, although the article says so: ψ changes x by −½πp.
+The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. The
+article says this of ψ, but ψ changes x by −½πp.
 
-If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. With a flow in closed form this gives the constant and the log-canonical
-bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat spray (f = 0), Ω₀ = Σ d(mean_i
-of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p: this is Karasev's construction, with the same S_i.
-Any other spray changes S_3 by a function G(x, ∇H) with G cubic in p, since two symmetric bi-realisations differ by a
-symplectic map that is the identity to first order at p = 0.
+If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. If moreover the flow has a closed form, α and β have one too. Examples are the
+constant and the log-canonical bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat
+spray (f = 0), Ω₀ = Σ d(mean_i of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p. This is Karasev's
+construction, with the same S_i. Any other spray changes S_3 by a function G(x, ∇H) with G(x, p) cubic in p. The reason
+is that two symmetric bi-realisations differ by a symplectic map that is the identity to first order at p = 0.
 
 Sprays and symplectic realisations: M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011).
 """
@@ -40,20 +41,20 @@ REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Sy
 
 #: Largest number of terms of a Lie series that counts as finite.
 LONGEST = 8
-#: Largest number of terms of a polynomial in the search for a closed form; the search stops beyond it.
+#: Largest number of terms of a polynomial in the search for a closed form. The search ends at a polynomial with more.
 SEARCHED_TERMS = 500
 #: End of the hint about a flat spray that has no closed form.
 KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a Poisson spray, which is symmetric: exact if phigen finds a closed form, else a
-    truncated series.
+    """Return the bi-realisation of a Poisson spray, which is symmetric.
 
-    ``choice.spray`` is ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves
-    each x_j p_j), ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j. ``choice.degree`` is the
-    degree in p of a truncated series. By default it is the (even) order of the method plus one; the defect of a step as
-    a Poisson map is then two orders in h smaller than its error.
+    The bi-realisation is exact if phigen finds a closed form; otherwise it is a truncated series. ``choice.spray`` is
+    ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves each x_j p_j),
+    ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j. ``choice.degree`` is the degree in p of
+    a truncated series. By default it is k + 1, where k is the order of the method, rounded up to an even number. Then a
+    step is a Poisson map up to O(h^(k+2)).
 
     Raises `SpecError` unless each f_j is a quadratic form in p, and for a degree that is too small for the order.
     Raises `LimitError` for series that are too long.
@@ -69,9 +70,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _half_flows(system: System, spray: Spray) -> BiRealisation | None:
-    """Return the bi-realisation α = τ∘Φ^{−½}, β = τ∘Φ^{½}; None unless L_X² ω = 0 and the flow Φ has a closed form.
+    """Return the bi-realisation α = τ∘Φ^{−½}, β = τ∘Φ^{½}, where Φ is the flow of the spray X, and τ(x, p) = x.
 
-    X is the field of the spray, Φ its flow, ω the canonical 2-form, and τ(x, p) = x.
+    Returns None unless L_X² ω = 0, where ω is the canonical 2-form, and Φ has a closed form.
     """
     space = spray.space
     if not space.vanishes(centred_form(spray, 3)[3]):
@@ -113,10 +114,9 @@ def _finite_series(spray: Spray, f: Poly) -> list[Poly] | None:
 
 
 def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, Expression]:
-    """Return the components of α − x and β − α for one coordinate, from the parts of this component of α by degree in
-    p.
+    """Return the components of α − x and β − α for one coordinate.
 
-    β follows from α, since β(x, p) = α(x, −p).
+    ``alpha`` has the parts of this component of α by degree in p. β follows from α, since β(x, p) = α(x, −p).
     """
     displacement = space.tower.combine(f for k, f in alpha.items() if k > 0)
     odd = space.tower.combine(f for k, f in alpha.items() if k % 2)
@@ -124,10 +124,9 @@ def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, E
 
 
 def _terminating(system: System, spray: Spray) -> BiRealisation | None:
-    """Return the bi-realisation of a spray with a nilpotent flow for which the series of α is finite; None for other
-    sprays.
+    """Return the bi-realisation of a spray if its flow is nilpotent and the series of α is finite, else None.
 
-    The series is complete if the axioms hold, so they are proved here.
+    The axioms are proved here, since they show that the series is complete.
     """
     coordinates = [spray.space.tower.variable(c) for c in system.coordinates]
     if any(_finite_series(spray, x) is None for x in coordinates):
@@ -170,12 +169,12 @@ def _maps(system: System, displacement: Sequence[Expression]) -> tuple[tuple[Exp
 
 
 def moser_steps(spray: Spray, degree: int) -> list[Step]:
-    """Return the factors of ψ₀, the map of Moser's trick with ψ₀*Ω₀ = ω, as many as α needs up to a degree in p."""
+    """Return the factors of ψ₀ that α needs up to a degree in p. ψ₀ is the map of Moser's trick, with ψ₀*Ω₀ = ω."""
     return straighten(spray.space, centred_form(spray, degree + 1), degree + 1)
 
 
 def alpha_series(spray: Spray, degree: int) -> list[GradedFunction]:
-    """Return, for each coordinate, the component of α = τ∘Φ^{−½}∘ψ₀ as parts by degree in p, up to ``degree``.
+    """Return the components of α = τ∘Φ^{−½}∘ψ₀, each as its parts by degree in p, up to ``degree``.
 
     Φ is the flow of the spray, τ(x, p) = x, and ψ₀ is the map of Moser's trick with ψ₀*Ω₀ = ω.
     """

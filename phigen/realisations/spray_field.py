@@ -1,8 +1,9 @@
 """A Poisson spray as a vector field X on T*U: its construction from a spec, the checks, and Lie series along it.
 
-X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l. So its x components are πp, and X is
-homogeneous: it raises the degree in p by 1. The article `PAPER` in `phigen.realisations.protocol` defines sprays in the
-section "Poisson Spray and Moser's trick". The example of that section sums over i < j, where all i, j are meant.
+T*U is the set of all (x, p). The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l. So
+the x components of X are πp, and the derivative along X raises the degree in p by 1. The article `PAPER` in
+`phigen.realisations.protocol` defines sprays in the section "Poisson Spray and Moser's trick". The example of that
+section sums over i < j, where all i, j are meant.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ MOST_TERMS = 20_000
 
 @dataclass(frozen=True)
 class Spray:
-    """A Poisson spray X on T*U: the components of the ``field`` for x, then those for p, as elements of the ring
-    ``space``.
+    """A Poisson spray X on T*U.
 
-    ``name`` names the spray for users.
+    ``field`` has the components of X for x, then those for p, as elements of the ring ``space``. ``name`` is the name
+    of the spray in texts for users.
     """
 
     space: Cotangent
@@ -44,7 +45,8 @@ class Spray:
 
 
 def make_spray(system: System, name_or_forces: str | Sequence[Expression]) -> Spray:
-    """Return the spray that a spec requests; the values are explained at `phigen.realisations.spray.build`.
+    """Return the spray that a spec requests. `phigen.realisations.spray.build` explains the values of
+    ``name_or_forces``.
 
     Raises `SpecError` if the p components are not quadratic forms in p.
     """
@@ -90,8 +92,8 @@ def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expressio
 def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
     """Raise `SpecError` unless the p components ``forces`` of the spray are quadratic forms in p.
 
-    A smooth function of p that is homogeneous of degree 2 is a quadratic form; the ring decides whether each component
-    is one.
+    The condition is that each component, as an element of the ring, is homogeneous of degree 2 in p: a smooth function
+    of p with this property is a quadratic form.
     """
     space, n = spray.space, system.dimension
     tower = space.tower
@@ -110,8 +112,10 @@ def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]
 
 
 def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
-    """Return the terms L_Xᵏ f / k! for k = 0 … length. Raises `LimitError` for a term with more than ``most_terms``
-    monomials."""
+    """Return the terms L_Xᵏ f / k! of a Lie series for k = 0 … length.
+
+    Raises `LimitError` for a term with more than ``most_terms`` monomials.
+    """
     result = [f]
     for k in range(1, length + 1):
         result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
@@ -123,10 +127,10 @@ def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS)
 
 
 def centred_form(spray: Spray, top: int) -> GradedForm:
-    """Return the parts of the 2-form Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``, for the flow Φ of the spray X.
+    """Return the parts of the 2-form Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``.
 
-    ω is the canonical form. The part of weight k + 1 is L_Xᵏ ω / ((k+1)! 2ᵏ) for even k; there are no parts of even
-    weight.
+    Φ is the flow of the spray X, and ω is the canonical form. The part of weight k + 1 is L_Xᵏ ω / ((k+1)! 2ᵏ) for even
+    k. There are no parts of even weight.
     """
     space, form = spray.space, spray.space.canonical()
     result = {1: form}

@@ -1,9 +1,11 @@
 """Proofs of the axioms for α and β that are truncated series in p, one degree in p after another.
 
-If α and β are correct up to degree d in p, their brackets are correct up to degree d − 1, since {·, ·} takes one
-derivative in p. So the statements are identities between homogeneous parts, denoted by their degree in brackets:
+If α and β are correct up to degree d in p, their brackets are correct up to degree d − 1, since {·, ·} contains one
+derivative with respect to p. Let f^(k) be the part of degree k in p of a function f. The axiom for α is proved as
 
-    Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1,    and likewise for β and for (α, β).
+    Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1.
+
+The other two axioms are proved in the same way.
 """
 
 from __future__ import annotations
@@ -22,7 +24,10 @@ EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the pr
 
 
 class _HomogeneousParts:
-    """The homogeneous parts in p, up to a degree, of some expressions in x and p, and the brackets of these parts."""
+    """The homogeneous parts of some expressions in x and p, by degree in p, and the brackets of these parts.
+
+    The parts are computed up to a ``degree``.
+    """
 
     def __init__(self, system: System, expressions: Sequence[Expression], degree: int) -> None:
         self.coordinates, self.covector = system.coordinates, covector_names(system.coordinates)
@@ -44,8 +49,9 @@ class _HomogeneousParts:
         return self._slopes[key]
 
     def bracket(self, e: int, f: int, degree: int) -> Poly:
-        """Return the homogeneous part of a given ``degree`` in p of the bracket of the expressions with the numbers
-        ``e`` and ``f``."""
+        """Return the part of this ``degree`` in p of the bracket of expression number ``e`` and expression number
+        ``f``.
+        """
         result = self.tower.zero
         for k in range(degree + 2):
             for c, p in zip(self.coordinates, self.covector, strict=True):
