@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from phigen._version import __version__
 
-TYPE_CHECKING = False  # Assigned here, since the import of typing takes longer than the rest of this module.
+TYPE_CHECKING = False  # Assigned here, since importing typing takes longer than the rest of this module.
 if TYPE_CHECKING:
     from typing import Any
 

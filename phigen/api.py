@@ -44,7 +44,7 @@ Source: TypeAlias = "str | PathLike[str] | Spec | System | LatticeSystem | Compi
 def load(path: str | PathLike[str]) -> System | LatticeSystem:
     """Return the system that a spec file defines; ``path`` is the file, or the name of a bundled spec.
 
-    The result is a `System`, or for a lattice a `LatticeSystem`. Its attribute ``spec`` holds the other parts of the
+    The result is a `System`, or a `LatticeSystem` for a lattice. Its attribute ``spec`` holds the other parts of the
     file. Raises `SpecError` with all errors of the file.
     """
     spec = specs.load(resources.file_of(fspath(path)))
@@ -99,19 +99,19 @@ def compile(
 
     ``source`` is a `System`, a spec, the path of a spec file, the name of a bundled spec, or a compilation.
 
-    ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
-    `PhigenWarning`. With ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; the
-    argument ``device`` is the number of the device to use.
+    ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda`` or ``auto``. The target ``auto`` is C if there is a compiler,
+    else NumPy with a `PhigenWarning`. With ``opencl`` and ``cuda``, ensembles and lattices run on a device, see
+    `Solver.device`; the argument ``device`` is the number of the device to use.
 
     ``order`` overrides the order of the spec, and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its
     scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`; parts
     that the spec requests are always included. ``profile`` is the profile of the code, ``fast`` by default; the profile
     in a spec only applies to ``phigen build``.
 
-    Compiled C is stored in a cache, under a hash of its content. Returns a `Solver`, or for a lattice a
-    `LatticeSolver`. Raises `SpecError`; `LimitError`; `CheckError` if a statement is refuted, e.g. if π is not Poisson;
-    and `ToolchainError` if C was requested and there is no working compiler, or if the compiler named in CC does not
-    work.
+    Compiled C is stored in a cache, under a hash of its content. Returns a `Solver`, or a `LatticeSolver` for a
+    lattice. Raises `SpecError` and `LimitError`. Raises `CheckError` if a statement is refuted, for instance if π is
+    not Poisson. Raises `ToolchainError` if C was requested and there is no working compiler, or if the compiler named
+    in CC does not work.
     """
     expect_runnable(target)
     if device is not None and target not in registry.DEVICES:
@@ -128,11 +128,11 @@ def expect_runnable(target: str) -> None:
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas, in sympy, of the method that `compile` uses: α, β, S_1 … S_k, and the discretised
+    """Return the formulas of the method that `compile` uses, in sympy: α, β, S_1 … S_k, and the discretised
     Hamiltonian.
 
-    ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`, and `SpecError`
-    for a splitting, which has none of these formulas.
+    ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`. Also raises
+    `SpecError` for a splitting, which has none of these formulas.
     """
     from phigen.notation.sympy_formulas import sympy_formulas
 
@@ -142,10 +142,10 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
 
 def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
-    """Return the compilation of a source: the method and the program, before they are printed in a target language.
+    """Return the compilation of a source: the method and the program. The statements about them are proved.
 
-    Its statements are proved. The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is
-    ``fast`` unless the options, or a source that is a compilation, name another one. Raises the errors of `compile`.
+    The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is ``fast``, unless the options
+    name another one or the source is a compilation with another one. Raises the errors of `compile`.
     """
     _expect_valid(**options)
     if isinstance(source, Compilation):
@@ -176,7 +176,7 @@ def _expect_valid(**options: Unpack[Overrides]) -> None:
 
 
 def solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> Solver:
-    """Compile and load the solver of a compilation, and return it.
+    """Build and load the solver of a compilation, and return it.
 
     Raises `ToolchainError` if C was requested and cannot be compiled.
     """
@@ -188,8 +188,9 @@ def solver_of(compilation: Compilation, target: str = "auto", device: int | None
 
 
 def lattice_solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> LatticeSolver:
-    """Compile and load the solver of a compiled lattice, and return it. Raises `ToolchainError` if C was requested and
-    cannot be compiled.
+    """Build and load the solver of the compilation of a lattice, and return it.
+
+    Raises `ToolchainError` if C was requested and cannot be compiled.
     """
     from phigen.runtime.lattice import LatticeSolver
 
@@ -207,8 +208,8 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
     """Return the files (name → text) that Python loads for a target.
 
-    For a target that is a device, these are the code for the device, and code in C or NumPy for computations that do
-    not run on devices.
+    If the target is a device, there is code for the device, and code in C or NumPy for computations that do not run on
+    devices.
     """
     if target not in registry.DEVICES:
         return emit(program, target, command)
@@ -231,8 +232,10 @@ def backend_of(files: Mapping[str, str], interface: Interface, target: str = "",
 
 
 def interface_of(program: Program) -> Interface:
-    """Return the `Interface` of a program, for a lattice its `LatticeInterface`: the names, sizes and features of the
-    solver that Python needs to run it.
+    """Return the `Interface` of a program: names, sizes and features of the solver, which Python needs to run
+    it.
+
+    For a lattice, the result is a `LatticeInterface`.
     """
     from phigen.runtime.interface import Interface, LatticeInterface
 
@@ -262,7 +265,7 @@ def interface_of(program: Program) -> Interface:
     from phigen.targets.device.launches import launches
 
     sites, relative = step.sites, step.relative
-    if relative:  # momenta of bodies without mass would have no velocities, so masses must be positive
+    if relative:  # a momentum of a body without mass defines no velocity, so masses must be positive
         bound = "positive" if relative.momenta else "nonnegative"
         interface = replace(interface, **{bound: getattr(interface, bound) | {relative.mass}})
     every_other = bool(step.partners and not step.partners.graph)
@@ -291,7 +294,7 @@ def interface_of(program: Program) -> Interface:
 
 
 def chosen_target(target: str, warn: Callable[[str], None] = lambda message: None) -> str:
-    """Return ``target`` or, if it is ``auto``, the name of a target: C if there is a compiler, else NumPy.
+    """Return ``target``; if it is ``auto``, return the target C if there is a compiler, else NumPy.
 
     If NumPy replaces C, ``warn`` receives the reason. Raises `ToolchainError` if the compiler named in CC does not
     work.
@@ -310,8 +313,7 @@ def chosen_target(target: str, warn: Callable[[str], None] = lambda message: Non
 
 
 def _spec_of(system: System) -> Spec:
-    """Return a spec for a system built in Python; settings that a system does not have get the defaults of a spec
-    file."""
+    """Return a spec for a system built in Python. Settings that are not part of a system have their defaults."""
     _expect_names(system)
     return Spec(
         name=system.name,

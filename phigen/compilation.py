@@ -2,8 +2,8 @@
 CompiledLattice``.
 
 All four classes have the members of `_Compiled` and a property ``system``; for a lattice of any size, this property
-raises `SpecError`. The methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return a compilation of one
-class, with its type, and raise `ValueError` for compilations of other classes.
+raises `SpecError`. Each of the methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` is for one class: there
+it returns the compilation, with the type of this class, and for other classes it raises `ValueError`.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class _Compiled(ABC):
     order: Order
     program: Program
     seconds: Mapping[str, float] = field(default_factory=dict)
-    choice: str = ""  # the reason for the scheme, if ``scheme: auto`` chose it
+    choice: str = ""  # the reason for the choice of the scheme, with ``scheme: auto``
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
@@ -65,9 +65,8 @@ class _Compiled(ABC):
     def exact(self) -> bool:
         """Whether a step preserves the Poisson structure to round-off, rather than up to a power of h.
 
-        A step of a series maps α(y, p) to β(y, p), where y is the solution of the implicit equation and p a covector.
-        It preserves the structure to round-off if the maps α, β are exact, rather than truncated in p. With forces, a
-        step that is exact in this sense is not a Poisson map; see `poisson`.
+        In a series, this is so if the maps α and β are exact, rather than truncated in p. Forces do not count here:
+        with forces a step is never a Poisson map, see `poisson`.
         """
 
     @property
@@ -82,8 +81,10 @@ class _Compiled(ABC):
 
     @property
     def degree(self) -> int | None:
-        """The degree d of a truncated method, whose steps are Poisson maps up to O(h^(d+1)); None if nothing is
-        truncated."""
+        """The degree d of a truncated method; None if nothing is truncated.
+
+        The steps of a truncated method are Poisson maps up to O(h^(d+1)).
+        """
         return None
 
     @property
@@ -93,8 +94,7 @@ class _Compiled(ABC):
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation (the maps α, β) that the compiler or the spec chose; None for schemes without
-        one."""
+        """The kind of the bi-realisation (the maps α, β); None for schemes without bi-realisation."""
         return None
 
     @property
@@ -104,8 +104,9 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
     def including(self, part: str) -> Self:
-        """Return the compilation with an optional part of the code, even if the profile or the spec leaves this part
-        out."""
+        """Return the compilation with an optional part of the code, even if the profile or the spec excludes
+        this part.
+        """
         extras, program = self.program.extras, self.program
         if program.offers(part):
             return self
@@ -113,13 +114,16 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=extras))
 
     def with_stack(self, stack: StackBound | None) -> Self:
-        """Return the compilation with ``stack``, the measured stack use that the C states in a comment; None for no
-        comment."""
+        """Return the compilation with a measured stack use. The C states it in a comment; None means that there is no
+        comment.
+        """
         return replace(self, program=replace(self.program, stack=stack))
 
     @property
     def method(self) -> str:
-        """The method in words, which runs print first: scheme, bi-realisation if there is one, order, and profile."""
+        """The method in words: scheme, bi-realisation if there is one, order, and profile. The output of runs begins
+        with it.
+        """
         scheme = self.described["scheme"]
         scheme_text = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
         return f"scheme {scheme_text}, order {self.order.order}, profile {self.program.profile}"
@@ -157,22 +161,21 @@ class _Compiled(ABC):
 
     @property
     def stage(self) -> Order:
-        """Order and number of terms of each map of which a step is composed.
+        """Order and number of terms of a single map of a step.
 
-        If a step is a single map, these are the order and the number of terms of the method. Otherwise each map has
-        order 2 and one term.
+        If a step is one map, these are the order and the number of terms of the method. If a step is composed of
+        several maps, each map has order 2 and one term.
         """
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
 
     @property
     def known_system(self) -> System | None:
-        """The system, which further compilations of the spec can use again; None for a lattice."""
+        """The system, for use in further compilations of the spec; None for a lattice."""
         return None
 
     def named(self, method: str) -> str:
-        """Return a line that names the method.
-
-        If the runs of the spec decide the method, the line also has the reason.
+        """Return a line that names the method: the argument, followed by a reason if the runs of the spec decide the
+        method.
         """
         return method
 
@@ -203,7 +206,10 @@ class _Compiled(ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _CompiledSystem(_Compiled, ABC):
-    """Base class of the compilations of ordinary systems, which have a fixed number of coordinates; lattices do not."""
+    """Base class of the compilations of ordinary systems, whose number of coordinates is fixed.
+
+    Compilations of lattices have another class.
+    """
 
     system: System
     gauge: Gauge = field(default_factory=Gauge)
@@ -235,8 +241,8 @@ class _CompiledSystem(_Compiled, ABC):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Call one of the three functions, that for the scheme of this compilation, with this compilation as its
-        argument. Return the result of the function.
+        """Call the function for the scheme of this compilation, with this compilation as its argument, and return the
+        result.
         """
 
     @property
@@ -273,10 +279,10 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def exact(self) -> bool:
-        """Whether the bi-realisation is exact, rather than truncated; a step then maps α(y, p) to β(y, p), to
-        round-off.
+        """Whether the maps α and β are exact, rather than truncated.
 
-        y is the solution of the implicit equation, and p a covector.
+        Then a step maps α(y, p) to β(y, p) to round-off, where y is the solution of the implicit equation, and p a
+        covector.
         """
         return self.realisation.exact
 
@@ -349,10 +355,10 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of size −h is the inverse of a step of size h.
+        """Whether a step of size −h is the inverse of a step of size h; false for a method with a corrector.
 
-        If the method has a corrector (a map after the last step, whose inverse comes before the first step), this
-        holds only up to terms of order ε², where ε is the size of the small part of H.
+        A corrector is a map after the last step, whose inverse is applied before the first step. With a corrector, step
+        −h is the inverse of step h only up to terms of order ε², where ε is the size of the small part of H.
         """
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2
@@ -393,7 +399,9 @@ class CompiledSplitting(_CompiledSystem):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledGauss(_CompiledSystem):
-    """Compilation by scheme ``gauss``: a step by Gauss collocation in the unknowns that ``gauss`` describes."""
+    """Compilation by scheme ``gauss``: a step by Gauss collocation. ``gauss`` describes the unknowns of the
+    equations.
+    """
 
     gauss: Realisation
 
@@ -404,7 +412,7 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The method in a few words for users: the unknowns of a step, and whether steps preserve the Poisson
+        """The method in a few words for users: the unknowns of a step, and whether a step preserves the Poisson
         structure.
         """
         return self.gauss.label
@@ -416,14 +424,14 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def degree(self) -> int | None:
-        """The order d of the method. If steps do not preserve the Poisson structure exactly, they preserve it up to
+        """The order d of the method. If steps do not preserve the Poisson structure exactly, the defect of a step is
         O(h^(d+1)).
         """
         return self.order.order
 
     @property
     def notes(self) -> list[str]:
-        """Choices of the compiler, each as a line of text, and a warning if steps are no Poisson maps."""
+        """Choices of the compiler, each as a line of text. A last line warns if steps are not Poisson maps."""
         defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
         warned = [] if self.gauss.exact else [f"structure: to truncation: a step is not a Poisson map; {defect}"]
         return [*super().notes, *warned]
@@ -459,10 +467,10 @@ class CompiledGauss(_CompiledSystem):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledLattice(_Compiled):
-    """Compilation of a lattice of any size: its ``cell`` (one site with its neighbours), and the plan of a
-    step.
+    """Compilation of a lattice of any size.
 
-    ``sweeps`` is the plan. A step consists of sweeps, each of which updates all sites.
+    ``cell`` describes one site with its neighbours. ``sweeps`` is the plan of a step: it consists of sweeps, each of
+    which updates all sites.
     """
 
     cell: Cell
@@ -510,7 +518,7 @@ class CompiledLattice(_Compiled):
 
     @property
     def exact(self) -> bool:
-        """True: a step is a composition of flows or implicit maps, which preserve the Poisson structure."""
+        """True: a step is composed of flows or implicit maps, each of which preserves the Poisson structure."""
         return True
 
     @property
@@ -522,15 +530,15 @@ class CompiledLattice(_Compiled):
     def described(self) -> dict[str, Any]:
         """The method as plain data, for the output of commands in JSON, with the number of colours of sites.
 
-        Some sizes of runs exclude splittings, or need more colours. The entry ``since`` then has the reason, else None.
+        The sizes of the lattice in runs of the spec may exclude splittings, or require more colours. Then the entry
+        ``since`` has the reason; otherwise it is None.
         """
         plan = self.sweeps
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return a line that names the method.
-
-        If the sizes in the runs decide the method, the line also has the reason.
+        """Return a line that names the method: the argument, followed by a reason if the sizes in runs decide the
+        method.
         """
         if not self.sweeps.since:
             return method
@@ -548,9 +556,7 @@ class CompiledLattice(_Compiled):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Raise `SpecError`: the three functions are for schemes of ordinary systems, and this is the compilation of a
-        lattice.
-        """
+        """Raise `SpecError`: none of the three functions is for lattices."""
         raise system_of_lattice(self.spec)
 
     def _repr_latex_(self) -> str:

@@ -6,8 +6,8 @@
 
 Each stage is a function from one frozen dataclass to the next. `Compilation` holds the results of all stages and their
 durations. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request. `Discretisation` holds
-the generating function. `Examination` holds the proofs. Statements about the system are proved before anything is built
-on it, and statements about the method afterwards.
+the generating function. `Examination` holds the proofs. Statements about the system are proved before the method is
+built, and statements about the method afterwards.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Order of a series that is built to estimate costs: its operations are counted, as a lower bound for a series of
-#: higher order, which would take long to build.
+#: To estimate the costs of a series of high order, which takes long to build, a series of this order is built. Its
+#: number of operations is a lower bound.
 PREVIEW_ORDER = 4
 
-#: Least number of sites of a lattice that is recognised in a spec with the equations of all sites. Specs with fewer
-#: coordinates are not examined for lattices.
+#: A spec that writes out the equations of all sites of a lattice is recognised if there are at least this many sites.
+#: Specs with fewer coordinates are not examined.
 LEAST_LATTICE_SITES = 8
 
 
@@ -66,11 +66,11 @@ def compile_spec(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Compilation:
-    """Compile a spec without proofs; the options override settings of the spec, see `Spec.overridden`.
+    """Compile a spec without proofs. The options override settings of the spec, see `Spec.overridden`.
 
-    ``system`` is the system of the spec, if the caller has already built it. `compile_proved` compiles with proofs.
-    Raises `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too
-    large).
+    ``system`` is the system of the spec, if the caller has already built it. To compile with proofs, call
+    `compile_proved`. Raises `SpecError` if the method does not apply, for instance because H does not split. Raises
+    `LimitError` if the program would be too large.
     """
     spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
@@ -135,8 +135,9 @@ def compile_proved(
 ) -> Compilation:
     """Compile a spec, as `compile_spec` does, and prove the statements about the system and the method.
 
-    Raises `CheckError` if a statement is refuted, with its name and its residual: π is not Poisson, a declared Casimir
-    is none, or the bi-realisation is wrong. Also raises the `SpecError` and `LimitError` of `compile_spec`.
+    Raises `CheckError` with the name and the residual of a statement if the statement is refuted. Then π is not
+    Poisson, a declared Casimir is not a Casimir, or the bi-realisation is wrong. Also raises the `SpecError` and
+    `LimitError` of `compile_spec`.
     """
     examination = examine(spec, system=system, **options)
     if examination.refuted:
@@ -152,7 +153,7 @@ def emit(program: Program, target: str, command: str, *, single_file: bool = Fal
     """Print a program in the language of a target, and return the files (name → text).
 
     ``command`` is the command line that regenerates the files; it is written into their headers. With ``single_file``,
-    code that is otherwise in several files is in one. Raises `ValueError` for an unknown target.
+    a target that writes several files writes one instead, if it can. Raises `ValueError` for an unknown target.
     """
     with progress.stage(f"{program.name}: emission of {target}"):
         return registry.find(target).emit(program, command, single_file=single_file)
@@ -178,7 +179,7 @@ def _warn_of_written_out_lattice(spec: Spec) -> None:
 
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
-    """Compile a lattice as far as possible, and prove all statements, which hold for any number of sites."""
+    """Compile a lattice as far as possible, and prove all statements. The proofs hold for any number of sites."""
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.proofs import lattice_statements
 
@@ -201,12 +202,11 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 
 
 def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
-    """Return the bi-realisation of a large system before anything is proved about the system, so that a program that
-    would exceed a limit is refused early.
+    """Return the bi-realisation of a large system, before anything is proved about the system.
 
-    Returns None if the system is small, if the Casimirs to be subtracted from H (the gauge) decide on the
-    bi-realisation, or if there is no bi-realisation; in the last case, the proofs report the reason. Raises
-    `LimitError` if the generating function would be too large.
+    So a system whose program would exceed a limit is refused early: `LimitError` is raised if the generating function
+    would be too large. Returns None if the system is small, or if the Casimirs to be subtracted from H (the gauge)
+    decide on the bi-realisation. Also returns None if there is no bi-realisation; the reason is reported later.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
     if spec.scheme != "series" or not as_it_is or not is_large(source):
@@ -220,8 +220,10 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
-    """Compile a system by the scheme of its spec; ``early_realisation`` is its bi-realisation (α, β), if already
-    known."""
+    """Compile a system by the scheme of its spec.
+
+    ``early_realisation`` is the result of `_realised_early`.
+    """
     if early_realisation:
         return _compile_series(spec, source, clock, early_realisation)
     return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
@@ -230,7 +232,7 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRe
 def _compile_series(
     spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None
 ) -> CompiledSeries:
-    """Compile a system by the scheme series: bi-realisation, Casimirs to subtract from H, generating function, program.
+    """Compile a system by the scheme series: choose bi-realisation and gauge, then build the program of a step.
 
     ``early_realisation`` is the bi-realisation, if `_realised_early` has found it already.
     """
@@ -258,8 +260,8 @@ def _compile_series(
 def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """Compile by the scheme that is expected to reach the accuracy of the requested order in the least time.
 
-    The series is not tried if its operations at a lower order show that it takes more time than another scheme. Raises
-    the error of the series if no scheme applies.
+    The series is not built if a series of lower order shows that it would take more time than another scheme. If no
+    scheme applies, the error of the series is raised.
     """
     compilations: dict[str, Compilation] = {}
     failures: dict[str, SpecError] = {}
@@ -292,8 +294,9 @@ def _settings_of_the_solve(spec: Spec) -> list[str]:
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
-    """Return the reason for choosing the scheme ``best``: the expected cost of each alternative, relative to
-    ``best``."""
+    """Return the reason for choosing the scheme ``best``: the expected times of the other schemes, relative to
+    ``best``.
+    """
     least = _expected(compilations[best])
     if least == 0:
         return f"{best}: one exact flow"
@@ -312,8 +315,7 @@ def _expected(compilation: Compilation) -> float:
 
 
 def _is_dearer(spec: Spec, source: System, least: float) -> bool:
-    """Whether a series is expected to cost more than ``least``; a series of low order gives a lower bound for its
-    cost."""
+    """Whether a series is expected to cost more than ``least``. The cost is estimated from a series of low order."""
     order = spec.order or 0
     if math.isinf(least) or order <= PREVIEW_ORDER:
         return False
@@ -354,10 +356,10 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """Return H as a sum of parts, each with its flow.
 
-    With the key ``coordinates_from``, there is a part for each body. Some parts have a motion that is known as a whole,
-    such as a Kepler motion. With a monitor (rescaled time: dt = g dτ), these motions are not used. They are not used
-    either if one of them would be the flow of all of H although the spec names a composition. Free rigid bodies may be
-    parts if `_turns_bodies` allows it.
+    With the key ``coordinates_from``, there is one part for each body. Otherwise some parts may be known motions, such
+    as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. Known motions are not used
+    with a monitor (rescaled time: dt = g dτ). Neither are they used if the whole of H would be one known motion
+    although the spec names a composition.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
@@ -369,8 +371,9 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
 
 def _turns_bodies(spec: Spec, system: System) -> bool:
-    """Whether free rigid bodies may be parts of H: true, unless the spec reconstructs an attitude that is not the
-    attitude of a rigid body.
+    """Whether free rigid bodies may be parts of H.
+
+    They may not if the spec reconstructs an attitude other than that of a rigid body.
     """
     group = _group(spec, system, "exponential")
     if group is None:
@@ -381,8 +384,7 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
 
 
 def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
-    """Compile a system by the scheme gauss: unknowns of the collocation, Casimirs to subtract from H, and the
-    program."""
+    """Compile a system by the scheme gauss: choose the unknowns and the gauge, then build the program."""
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
@@ -411,7 +413,7 @@ SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = 
 
 
 def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
-    """Compile a lattice, for any numbers of sites, to a plan of sweeps (updates of all sites)."""
+    """Compile a lattice for any number of sites. A step is planned as sweeps (updates of all sites)."""
     if spec.scheme == "gauss":
         expect_offered(spec)
     from phigen.lattice.cell_building import expect_coloured
@@ -439,7 +441,7 @@ def _expect_no_settings_of_the_solve(spec: Spec) -> None:
 
 
 def _group(spec: Spec, source: System, kind: str) -> Group | None:
-    """Return the group to which the attitude increment of a step belongs; None unless the spec says ``reconstruct``."""
+    """Return the group of the attitude increment of a step; None unless the spec has the key ``reconstruct``."""
     if not spec.reconstruct:
         return None
     from phigen.attitude.group import group_of
@@ -449,7 +451,9 @@ def _group(spec: Spec, source: System, kind: str) -> Group | None:
 
 @contextmanager
 def bounded(spec: Spec) -> Iterator[None]:
-    """Context in which polynomials that would not fit into memory raise a `LimitError` with the name of the spec."""
+    """Context that turns the `OverflowError` of polynomials that do not fit into memory into a `LimitError` about the
+    spec.
+    """
     try:
         yield
     except OverflowError as error:
@@ -458,8 +462,9 @@ def bounded(spec: Spec) -> Iterator[None]:
 
 
 class _Clock:
-    """Stopwatch for the stages of a compilation. If a stage is entered several times, ``seconds`` has the sum of its
-    durations.
+    """Stopwatch for the stages of a compilation.
+
+    ``seconds`` has the duration of each stage, or the sum of the durations if a stage is entered several times.
     """
 
     def __init__(self) -> None:

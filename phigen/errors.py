@@ -36,7 +36,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """Message about a spec: what is wrong or doubtful, where in the spec, and a hint how to correct it."""
+    """Message about a spec. It says what is wrong or doubtful, and where in the spec; a hint says how to correct it."""
 
     message: str
     location: Location | None = None
@@ -58,10 +58,10 @@ class Diagnostic:
 
 
 def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
-    """Return at most ``width`` characters of a line around ``column``, and the number of the column within this
-    text.
+    """Return at most ``width`` characters of a line around ``column``, and the number of the column within these
+    characters.
 
-    Columns count from 0. Characters that a terminal would not show as one character are replaced, so that a caret below
+    Columns count from 0. Characters that a terminal would not display as one character are replaced. So a caret below
     the text points at the right character.
     """
     start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
@@ -86,8 +86,8 @@ class PhigenError(Exception):
     exit_code = 4
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default, pickle creates an exception from its message alone, which fails for exceptions with further
-        # arguments.
+        # By default, pickle restores an exception by calling its class with the message alone. This fails for classes
+        # with further arguments.
         return _restored, (type(self), self.args, self.__dict__)
 
 
@@ -139,7 +139,7 @@ class MissingPackageError(PhigenError):
 
 
 class FileError(PhigenError):
-    """A file cannot be written, and the message of the operating system does not give the reason."""
+    """A file that the user named cannot be written, or has not the contents that are needed."""
 
     exit_code = 2
 
@@ -162,7 +162,7 @@ class StepError(PhigenError):
 
 
 class ParameterError(StepError, ValueError):
-    """No step is possible with the given parameters, since values computed from the parameters alone are not finite."""
+    """No step is possible with the given parameters: a value that is computed from parameters alone is not finite."""
 
 
 def _restored(kind: type[PhigenError], args: tuple[Any, ...], parts: dict[str, Any]) -> PhigenError:

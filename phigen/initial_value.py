@@ -26,12 +26,12 @@ from phigen.runtime.trajectory import Trajectory
 if TYPE_CHECKING:
     from phigen.geometry.system import System
 
-#: An event as in SciPy: a function of t and y (DIM,) whose zeros are located. The function may have the attributes
-#: ``terminal`` and ``direction``.
+#: An event as in SciPy: a function of t and y (DIM,) whose zeros are located. It may have the attributes ``terminal``
+#: and ``direction``.
 Event = Callable[[float, Floats], float]
 
-#: For calls without a step ``h``: number of steps of the first attempt, and largest number of attempts. Each attempt
-#: has half the step size of the attempt before.
+#: For calls without a step ``h``: number of steps of the first attempt, and largest number of attempts. Each further
+#: attempt halves the step size.
 _FIRST_STEPS, _MAX_HALVINGS = 64, 16
 
 _REACHED = "The solver successfully reached the end of the integration interval."
@@ -43,9 +43,9 @@ class OdeResult:
     """Result of `solve_ivp`, with the fields of SciPy's result.
 
     ``t`` (points,) are the times and ``y`` (DIM, points) the states. ``sol`` is a function of times, or None.
-    ``t_events`` and ``y_events`` have an array for each event, or are None. ``status`` is 0 at the end of the interval,
-    1 at an event, −1 after a failure. ``h`` is the step size. ``trajectory`` is the integrated trajectory; its times
-    begin at 0 if the Hamiltonian does not depend on the time.
+    ``t_events`` and ``y_events`` are lists with one array for each event, or None. ``status`` is 0 at the end of the
+    interval, 1 at an event, −1 after a failure. ``h`` is the step size. ``trajectory`` is the integrated trajectory;
+    its times begin at 0 if the Hamiltonian does not depend on the time.
     """
 
     t: Floats
@@ -64,7 +64,7 @@ class OdeResult:
         return self.status >= 0
 
 
-#: Arguments of SciPy's solve_ivp that are refused → the reason, which the error message states.
+#: Arguments of SciPy's solve_ivp that are refused → the reason, for the error message.
 _SCIPY = {
     "method": "the method is that of the solver; order= changes its order",
     "jac": "phigen derives all derivatives itself",
@@ -145,8 +145,9 @@ def solve_ivp(
 
 @dataclass(frozen=True)
 class _Problem:
-    """Initial value problem: a solver, the interval of time from ``begin`` to ``end``, an initial state and
-    parameters."""
+    """Initial value problem: a solver, the time interval from ``begin`` to ``end``, the initial state, and
+    parameters.
+    """
 
     solver: Solver
     begin: float
@@ -156,9 +157,10 @@ class _Problem:
 
     @property
     def offset(self) -> float:
-        """The difference between times as the user counts them and times of the solver.
+        """The number that is added to a time of the solver to get a time of the user.
 
-        The difference is 0 if the Hamiltonian depends on the time; otherwise times of the solver begin at 0.
+        It is 0 if the Hamiltonian depends on the time. Otherwise times of the solver begin at 0, and the number is
+        ``begin``.
         """
         return 0.0 if self.solver.interface.time else self.begin
 
@@ -171,9 +173,9 @@ class _Problem:
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
         """Return a step size, and whether it reaches the tolerances.
 
-        The step size is halved until the last halving changes the last state by no more than the tolerances. If this
-        does not happen, the smallest step size that was tried is returned, and False. Raises `StepError` if the last
-        attempt fails.
+        The step size is halved until a halving changes the last state by no more than the tolerances. If this never
+        happens, the result is the smallest step size that was tried, and False. Raises `StepError` if the last attempt
+        fails.
         """
         h, previous, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
         for _ in range(_MAX_HALVINGS):
@@ -191,8 +193,8 @@ class _Problem:
         return 2 * h, False
 
     def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Return the times and states of each event, and the time of the first terminal event, or None if there is
-        none.
+        """Return the times and states of each event, and the time of the first terminal event, or None without
+        one.
 
         The integration ends at the first terminal event, so later events are left out.
         """
@@ -206,8 +208,9 @@ class _Problem:
         return [[(t, x) for t, x in event_crossings if (t - last) * sign <= 0] for event_crossings in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
-        """Return the times and states at which an event changes its sign, in the direction that its attribute
-        states."""
+        """Return the times and states at which an event changes its sign in the direction of its attribute
+        ``direction``.
+        """
         direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
         )  # SciPy counts the direction along the integration, CrossingFinder along increasing time.
@@ -233,8 +236,9 @@ class _Problem:
         return crossings_so_far
 
     def solution(self, trajectory: Trajectory) -> Callable[[ArrayLike], Floats]:
-        """Return the function ``sol`` of SciPy's result: it returns the state (DIM,) at a time, or states (DIM,
-        times)."""
+        """Return the function ``sol`` of SciPy's result. For a time it returns a state (DIM,), for times the states
+        (DIM, times).
+        """
 
         def sol(t: ArrayLike) -> Floats:
             times = np.asarray(t, dtype=np.float64)

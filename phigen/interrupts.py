@@ -14,12 +14,12 @@ from types import FrameType
 
 CODE = 130
 
-#: Whether a command is running that must clean up after Ctrl-C, so that Ctrl-C raises `KeyboardInterrupt`.
+#: Whether Ctrl-C raises `KeyboardInterrupt`: a command is running, which must clean up after Ctrl-C.
 working = False
 
 
 def obey() -> None:
-    """Install the handler of Ctrl-C, unless the process ignores the signal, as background jobs do."""
+    """Install the handler of Ctrl-C. A process that ignores Ctrl-C, such as a background job, remains unchanged."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _handle)
         sys.unraisablehook = _unraisable

@@ -1,7 +1,7 @@
 """Checks that arrays over the sites of a lattice fit into memory, before they are allocated.
 
-Without a check, Linux lets a process allocate more memory than there is. It kills the process later, when the process
-writes to this memory.
+Linux lets a process allocate more memory than there is, and kills the process later, when it writes to this memory. The
+checks prevent this.
 """
 
 from __future__ import annotations
@@ -39,26 +39,25 @@ def expect_room(what: str, byte_count: int, place: Location | None = None, hint:
 
 
 def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
-    """Return a new array, filled with NaN. Raises `LimitError` if it does not fit into memory; ``what`` is its name.
+    """Return a new array, filled with NaN. Raises `LimitError` if it does not fit into memory; ``what`` is its
+    name.
 
-    NaN is written to the whole array at once, because untouched pages of ``np.empty`` would still count as available
-    when the next array is allocated.
+    Writing NaN takes the memory at once. Memory of an array by ``np.empty`` would still count as available when the
+    next array is allocated.
     """
     expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
     return np.full(shape, np.nan, dtype)
 
 
 def available() -> int | None:
-    """Return the bytes of memory that this process can still allocate, swap space included; None if they are
-    unknown."""
+    """Return the bytes of memory, with swap space, that this process can still allocate; None if they are unknown."""
     limits = [limit for limit in (_of_machine(), *_of_groups()) if limit is not None]
     return min(limits, default=None)
 
 
 def _of_machine() -> int | None:
-    """Return the free memory of the machine in bytes.
-
-    If the free memory is unknown, returns the whole memory; if the whole memory is unknown too, None.
+    """Return the free memory of the machine in bytes; if it is unknown, the whole memory; if that is unknown
+    too, None.
     """
     sizes = _table(Path("/proc/meminfo"), ":")
     if "MemAvailable" in sizes:
@@ -70,7 +69,8 @@ def _of_machine() -> int | None:
 
 
 def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
-    """Yield the bytes that the limits of control groups, of version 2 and of version 1, leave to this process.
+    """Yield the bytes that the limits of control groups leave to this process. Versions 1 and 2 of control groups are
+    read.
 
     Nothing is yielded for groups without limits. Cached pages of files count as available, since the system can drop
     them.
@@ -92,7 +92,9 @@ def _number(path: Path) -> int | None:
 
 
 def _table(path: Path, separator: str | None = None) -> dict[str, int]:
-    """Return the numbers in a file whose lines have a name and a number, by name; {} if the file cannot be read."""
+    """Return the numbers in a file whose lines are a name and a number: name → number. {} if the file cannot be
+    read.
+    """
     try:
         rows = [line.split(separator, 1) for line in path.read_text().splitlines()]
         return {name: int(value.split()[0]) for name, value in rows}

@@ -8,9 +8,9 @@
     mpirun -n 8 python script.py
 
 A plane is the set of all sites with one index of the first axis. Each process has adjacent planes, and runs the C
-solver on its planes and on copies of the neighbouring planes (a halo). Before a sweep (an update of sites) that reads
-the halo, the process requests it from its neighbours by mpi4py, and works on its inner planes until the halo has
-arrived. The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
+solver on its planes and on copies of the neighbouring planes (a halo). If a sweep (an update of sites) reads the halo,
+the process first requests it from its neighbours, by mpi4py. It works on its inner planes until the halo has arrived.
+The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: STRETCH is the number of steps between two checks that all values are finite. If a single step fails, FAR_STEPS steps
-#: from this step on use functions that are valid for all arguments. These numbers are those of
-#: templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
+#: STRETCH is the number of steps between two checks that all values are finite. If a step fails when it is made alone,
+#: this step and the following ones, FAR_STEPS in all, use functions that are valid for all arguments. The numbers are
+#: those of templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
-#: Arguments of `LatticeSolver.integrate` that are refused for several processes, since they need parts of steps, or
-#: copies of the solver.
+#: Arguments of `LatticeSolver.integrate` that are refused on several processes. They need parts of steps, or copies of
+#: the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
-#: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1 of such an
+#: An array over the whole lattice, or a function. The function f(first, end) returns the planes first … end − 1 of the
 #: array. A plane is the set of all sites with one index of the first axis.
 Given = Any
 
@@ -54,8 +54,8 @@ Given = Any
 class DistributedRun:
     """Results of a run on several processes; each process has an object of its own.
 
-    ``t`` and ``energy`` (frames,) refer to the whole lattice. ``x`` (frames, coordinates, planes, …) has the planes
-    ``planes[0]`` … ``planes[1]`` − 1 of this process, and is None if frames went to a file. ``waiting`` is the time in
+    ``t`` and ``energy`` (frames,) refer to the whole lattice. ``x`` (frames, coordinates, planes, …) has the planes of
+    this process, ``planes[0]`` … ``planes[1]`` − 1. If frames went to a file, ``x`` is None. ``waiting`` is the time in
     seconds that this process waited for planes of its neighbours.
     """
 
@@ -68,10 +68,11 @@ class DistributedRun:
 
 
 class DistributedLattice:
-    """Solver of a lattice whose sites are divided among the processes of an MPI communicator, by default all processes.
+    """Solver of a lattice whose sites are divided among the processes of an MPI communicator.
 
-    ``source`` is an argument of `phigen.compile`, or a `LatticeSolver` for C in profile fast. The lattice must be a
-    grid with scheme splitting. Raises `ValueError` for other lattices.
+    ``source`` is an argument of `phigen.compile`, or a `LatticeSolver` for C in profile fast. ``comm`` is the
+    communicator, by default that of all processes. The lattice must be a grid with scheme splitting. Raises
+    `ValueError` for other lattices.
     """
 
     def __init__(self, source: Any, comm: Any = None, order: int | None = None) -> None:
@@ -88,7 +89,7 @@ class DistributedLattice:
 
         compilation = compilation_of(source, order=order, profile="fast")
         if self.comm.rank == 0:
-            lattice_solver_of(compilation, "c")  # compiles the C into the cache, from which all other processes load it
+            lattice_solver_of(compilation, "c")  # puts the compiled C into the cache, for all other processes
         self.comm.barrier()
         return lattice_solver_of(compilation, "c")
 
@@ -113,14 +114,14 @@ class DistributedLattice:
     ) -> DistributedRun:
         """Integrate as `LatticeSolver.integrate`; all processes call this method with the same arguments.
 
-        ``x0`` is an array (coordinates, *sizes), or a function x0(first, end) that returns the planes first … end − 1,
-        of shape (coordinates, end − first, …), where a plane is the set of all sites with one index of the first axis.
-        A function needs ``sizes``. Parameters at sites are arrays or such functions. Frames are written to ``output``,
-        a ``.npy`` file that all processes share.
+        ``x0`` is an array (coordinates, *sizes), or a function. A call x0(first, end) returns an array (coordinates,
+        end − first, …) with the planes from ``first`` to before ``end``, where a plane is the set of all sites with one
+        index of the first axis. If ``x0`` is a function, ``sizes`` is required. Parameters at sites may be functions as
+        well. Frames are written to ``output``, a ``.npy`` file that all processes share.
 
-        ``checkpoints`` is a path at which the state is stored with every frame. If a run is interrupted, the same call
-        continues it, on any number of processes; with ``resume=False`` the run starts again, unless files of an
-        interrupted run exist.
+        ``checkpoints`` is a path. The state is stored there with every frame. If a run is interrupted, the same call
+        continues it, on any number of processes. With ``resume=False``, files of an interrupted run are an error
+        instead.
 
         Raises on all processes: `StepError` if a step fails, and `ValueError` if existing files do not allow the run to
         begin or to continue.
@@ -167,7 +168,7 @@ class DistributedLattice:
                     checkpoint.save(energy)
                 if progress:
                     progress(int(marks[k]))
-        except StepError:  # raised on all processes; the run cannot be continued, so its files are removed
+        except StepError:  # raised on all processes. The run cannot be continued, so its files are removed.
             frames.close()
             frames.discard()
             if checkpoint:
@@ -187,7 +188,8 @@ class DistributedLattice:
 class _Domain:
     """The planes of one process, with copies of neighbouring planes, and the steps of these planes.
 
-    ``open`` says that the state lacks the last flow of its step, which is merged with the first flow of the next step.
+    The last flow of a step is merged with the first flow of the next step. ``open`` is true while this last flow is
+    missing.
     """
 
     def __init__(
@@ -221,7 +223,7 @@ class _Domain:
         session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
         assert isinstance(session, CLatticeSession)
         self.session = session
-        if self.noisy:  # each site draws the random numbers that it has in the whole lattice
+        if self.noisy:  # the random numbers of a site depend on its position in the whole lattice
             session.set_planes((self.planes[0] - ghosts[0]) % sizes[0], sizes[0])
         self.session.begin(h)
         self.fields = len(lattice.solver.coordinates)
@@ -233,10 +235,10 @@ class _Domain:
     # --- distribution of planes
 
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
-        """Return the first plane of this process and the plane after its last.
+        """Return the index of the first plane of this process, and that of the plane after the last one.
 
         The colours of sites repeat after some number of planes. Each process but the last has a multiple of this number
-        of planes, and all processes have nearly the same number.
+        of planes. The processes have nearly equal numbers of planes.
         """
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):
@@ -259,8 +261,9 @@ class _Domain:
         return [behind, ahead]
 
     def _planes_of(self, values: Given, first: int, end: int, axis: int) -> Floats:
-        """Return the planes first … end − 1 of ``values``, an array or a function; indices beyond the ends wrap
-        around."""
+        """Return the planes first … end − 1 of ``values``, an array or a function. Indices outside the lattice wrap
+        around.
+        """
         size = self.sizes[0]
         if not callable(values):
             return np.take(np.asarray(values, dtype=np.float64), np.arange(first, end) % size, axis)
@@ -306,8 +309,7 @@ class _Domain:
         self._set_solver_time(self.steps)
 
     def _set_solver_time(self, steps: int) -> None:
-        """Set time and number of steps in the solver to those after ``steps`` steps, if H or the noise depends on
-        them."""
+        """Set the time and the number of steps in the solver, if H or the noise depends on them."""
         if self.lattice.solver.interface.time or self.noisy:
             self.session.passed(self.h, steps)
 
@@ -332,8 +334,7 @@ class _Domain:
         return True
 
     def _apply_last_flow(self) -> None:
-        """Apply the last flow of the last step, if it is still missing; ``saved`` remains the state without this
-        flow."""
+        """Apply the last flow of the last step, if it is still missing. ``saved`` stays the state without this flow."""
         if not self.open:
             return
         self._set_solver_time(self.steps - 1)
@@ -343,11 +344,11 @@ class _Domain:
             self._stage(self.joined - 1, far=True)
 
     def _stage(self, number: int, far: bool = False) -> None:
-        """Make one sweep (an update of sites) over all planes of this process; with ``far``, by full-range
-        functions.
+        """Make one sweep (an update of sites) over all planes of this process.
 
-        If the sweep reads halos (copies of neighbouring planes) that are out of date, they are requested first. The
-        inner planes are updated while the halos are being received, and the outer planes after that.
+        If ``far`` is true, the sweep uses functions that are valid for all arguments. If the sweep reads halos (copies
+        of neighbouring planes) that are out of date, the halos are requested first. The inner planes are updated while
+        the halos are being received, and the outer planes after that.
         """
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
@@ -368,8 +369,8 @@ class _Domain:
     def _request_halos(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
         """Send the planes that neighbouring processes read, and request planes from them.
 
-        ``fields`` is a bit mask of the coordinates to be exchanged. Returns (request, coordinate, planes of the halo,
-        buffer) for each message to be received, where the halo consists of the copies of neighbouring planes.
+        ``fields`` is a bit mask of the coordinates to be exchanged. Returns a tuple for each message to be received:
+        (request, coordinate, planes of the halo, buffer). The halo consists of the copies of neighbouring planes.
         """
         (behind, ahead), (first, end), (reach_behind, reach_ahead) = self.beside, self.own, self.reach
         requests, sent = [], []
@@ -384,15 +385,14 @@ class _Domain:
                     sent.append(self.comm.Isend(self.session.planes(field, *mine), neighbour, 2 * field + tag))
                 if theirs[0] < theirs[1]:
                     buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
-                    # tag of messages from the process ahead: 2 * field, from the process behind: 2 * field + 1
+                    # Tags: 2 * field for messages from the process ahead, 2 * field + 1 for messages from the process
+                    # behind.
                     requests.append((self.comm.Irecv(buffer, neighbour, 2 * field + 1 - tag), field, theirs, buffer))
         self._sent = sent
         return requests
 
     def _received(self, requests: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
-        """Wait for the requested planes of neighbouring processes, and copy them into the halos, the copies of these
-        planes.
-        """
+        """Wait for the requested planes of neighbouring processes, and copy them into the halos."""
         begin = time.perf_counter()
         _mpi().Request.Waitall([request for request, *_ in requests])
         self.waiting += time.perf_counter() - begin
@@ -419,7 +419,7 @@ class _Domain:
         return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
 
     def energy(self) -> float:
-        """Return H of the whole lattice, on all processes. The sums over the single planes are added by `math.fsum`."""
+        """Return H of the whole lattice, on all processes. The sums over single planes are added by `math.fsum`."""
         self._received(self._request_halos(self.dirty))
         self.dirty = 0
         density = self.session.density()[self.own[0] : self.own[1]]
@@ -440,27 +440,27 @@ class _Domain:
         self._set_solver_time(steps)
 
     def saved_state(self) -> Floats:
-        """Return the planes of this process in the stored state, from which further steps continue.
+        """Return this process's planes of ``saved``, the state from which further steps continue.
 
-        If ``open`` is true, this state lacks the last flow of its last step.
+        If ``open`` is true, the last flow of the last step is missing in this state.
         """
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 
 
 def _part(path: Path) -> Path:
-    """Return the name that the file of frames has until the run is complete."""
+    """Return the path of the file of frames while the run is incomplete."""
     return path.with_name(path.name + ".part")
 
 
 def _objection(output: Path | None, checkpoints: Path | None, *, resume: bool) -> str:
-    """Return the reason why a run may not begin, or continue, with the existing files; "" if it may."""
+    """Return the reason why existing files do not allow a run to begin or to continue; "" if they allow it."""
     if checkpoints:
         return objection(checkpoints, output, resume=resume, how="resume=True")
     return objection_to_frames(_part(output)) if output else ""
 
 
 class _SharedArrayFile:
-    """File ``.npy`` with arrays (…, coordinates, *sizes), of which each process writes and reads its own planes."""
+    """File ``.npy`` with an array (…, coordinates, *sizes). Each process writes and reads its own planes."""
 
     def __init__(self, domain: _Domain, path: Path, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain = domain
@@ -479,21 +479,21 @@ class _SharedArrayFile:
         self.file = mpi.File.Open(domain.comm, str(path), mpi.MODE_RDWR)
 
     def _place(self, block: int) -> int:
-        """Return the offset in the file, in bytes, of this process's planes in block ``block``.
+        """Return the offset, in bytes, at which block ``block`` of the file has the planes of this process.
 
-        The file has one block for each array and coordinate.
+        There is one block for each state in the file and each coordinate.
         """
         planes = self.domain.sizes[0]
         plane = 8 * math.prod(self.domain.sizes[1:])
         return self.start + (block * planes + self.domain.planes[0]) * plane
 
     def write(self, k: int, x: Floats) -> None:
-        """Write the planes of this process into array number ``k``."""
+        """Write the planes of this process as part of state number ``k``."""
         for field, values in enumerate(x):
             self.file.Write_at_all(self._place(k * len(x) + field), np.ascontiguousarray(values))
 
     def read(self) -> Floats:
-        """Return the planes of this process from the first array."""
+        """Return the planes of this process in the first state of the file."""
         if self.file.Get_size() < self.start + 8 * self.domain.fields * math.prod(self.domain.sizes):
             raise ValueError(f"{self.path} is shorter than a state of this run")
         first, end = self.domain.planes
@@ -507,7 +507,7 @@ class _SharedArrayFile:
 
 
 class _Frames:
-    """Frames of a run: in one file for all processes or, without a path, in an array of each process."""
+    """Frames of a run. They are in one file for all processes or, without a path, in an array of each process."""
 
     def __init__(self, domain: _Domain, path: Path | None, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain, self.path, self.array = domain, path, None
@@ -548,10 +548,10 @@ class _Frames:
 
 
 class _StoredState:
-    """The state of a run in files at ``path``, from which the run can be continued after an interruption.
+    """Files with the state of a run, from which the run can be continued after an interruption.
 
-    A JSON file at ``path`` describes the state; its values are in one of two files that are written alternately, so
-    that the last complete state is never overwritten.
+    A JSON file at ``path`` describes the state. Its values are in one of two further files, which are written
+    alternately, so that the last complete state is never overwritten.
     """
 
     def __init__(self, domain: _Domain, path: Path, run: Sequence[float]) -> None:
@@ -561,11 +561,11 @@ class _StoredState:
         self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
-        """Return the path of the file with the state after ``count`` frames; two paths alternate."""
+        """Return the path of the file for the state after ``count`` frames: one of two paths, in turn."""
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:
-        """Store the present state, and then its description with the energies of all frames so far."""
+        """Store the present state, and then its description, with the energies of all frames until now."""
         domain, count = self.domain, len(energy)
         state_file = _SharedArrayFile(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
         state_file.write(0, domain.saved_state())
@@ -577,7 +577,7 @@ class _StoredState:
                 file.write(json.dumps({"identity": self.identity, **record}).encode())
 
     def restored(self) -> list[float]:
-        """Restore the stored state, and return the energies of the frames up to it; [] if nothing is stored.
+        """Restore the stored state, and return the energies of all frames until then; [] if nothing is stored.
 
         Raises `ValueError` if another run has stored the state.
         """

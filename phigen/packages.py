@@ -9,7 +9,7 @@ from phigen.errors import MissingPackageError
 
 
 def imported(name: str, user: str = "this", installed_by: str = "") -> Any:
-    """Return the module of that name. Raises `MissingPackageError` if the package is not installed.
+    """Return the module ``name``. Raises `MissingPackageError` if its package is not installed.
 
     The message says that ``user`` needs the package. ``installed_by`` are the arguments for ``pip install``, by default
     the name of the package.

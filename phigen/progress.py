@@ -13,10 +13,10 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Context manager for a stage of a compilation. The stage has completed ``done`` of ``total`` parts of its
-    work.
+    """Context manager for a stage of a compilation.
 
-    ``total`` is 0 if the number of parts is unknown. ``began`` is the time at which the stage started.
+    The work of a stage has ``total`` parts, of which ``done`` are completed; ``total`` is 0 if the number is unknown.
+    ``began`` is the time at which the stage started.
     """
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
@@ -49,14 +49,14 @@ class Stage:
         return f"{self.name}, {self.done}" if self.done else self.name
 
 
-#: Observer of a compilation: it is called with the active stages, outermost first, when a stage starts or ends.
+#: Observer of a compilation. It is called whenever a stage starts or ends, with the active stages, outermost first.
 Watcher = Callable[[tuple[Stage, ...]], None]
 
 stage = Stage
 
 
 class _Here(threading.local):
-    """The active stages of one thread, and the observer of its stages."""
+    """The active stages of one thread, and the observer of this thread."""
 
     def __init__(self) -> None:
         self.stages: list[Stage] = []

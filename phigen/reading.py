@@ -19,8 +19,8 @@ def opened(path: str | Path) -> BinaryIO:
     Raises `OSError` with the path for everything other than a regular file, and `ValueError` for a path with a null
     character.
     """
-    # The type is checked after the file was opened, so that nobody can replace the file between check and opening.
-    # Opening without blocking makes pipes return too, so that they can be refused.
+    # The type is checked after the file was opened, so that nobody can replace the file in between. Opening with
+    # O_NONBLOCK does not wait at pipes, so they can be refused too.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):

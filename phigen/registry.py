@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 class Target:
     """Language in which phigen writes solvers, or a device that runs solvers.
 
-    ``emitter`` is the module with the function ``emit(program, command)``, which returns the files (name → text); if
-    ``single_file`` is set, this function also takes the argument ``single_file``. ``loader`` is the module with the
+    ``emitter`` is the module with the function ``emit(program, command)``, which returns the files (name → text). If
+    ``single_file`` is true, this function also takes the argument ``single_file``. ``loader`` is the module with the
     function ``load(files, interface)``, which returns a loaded solver; it is empty if Python cannot run the files.
-    ``suffixes`` has the suffixes of all files, the suffix of the main file first. ``default`` marks the targets of
-    specs that name none. ``compiled`` says that a compiler is needed.
+    ``suffixes`` has the suffixes of all files, the suffix of the main file first. ``default`` is true for targets that
+    a spec gets if it names none. ``compiled`` is true if a compiler is needed.
 
-    The field ``device`` is true for a device, such as OpenCL. A device runs files of the target named "device", and its
-    solver also contains files in C or NumPy, which run on the processor.
+    ``device`` is true for a device, such as OpenCL. A device runs files of the target named "device". The solver of a
+    device also contains files in C or NumPy, which run on the processor.
     """
 
     name: str
@@ -50,14 +50,16 @@ class Target:
         return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
 
     def expect_offered(self, program: Program) -> None:
-        """Raise `SpecError` if the target cannot express the program; `emit` would raise the same error."""
+        """Raise `SpecError` if the target cannot express the program. `emit` would raise the same error."""
         refuse = getattr(import_module(self.emitter), "expect_offered", None)
         if refuse is not None:
             refuse(program)
 
     def load(self, files: Mapping[str, str], interface: Interface, device: int | None = None) -> Backend:
-        """Return the loaded solver of generated files; ``device`` is the number of a device. Raises
-        `ToolchainError`."""
+        """Return the loaded solver of generated files. ``device`` is the number of a device.
+
+        Raises `ToolchainError`.
+        """
         options = {} if device is None else {"device": device}
         return cast("Backend", import_module(self.loader).load(files, interface, **options))
 
@@ -89,7 +91,8 @@ DEVICES: Mapping[str, Target] = {
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
 }
 
-#: DEFAULT has the names of the targets of a spec that names none, LOADABLE those of the targets that Python can load.
+#: DEFAULT: names of the targets that a spec gets if it names none. LOADABLE: names of the languages in which Python can
+#: load solvers.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
@@ -98,7 +101,7 @@ RUNNABLE = (*LOADABLE, *DEVICES)
 
 
 def find(name: str) -> Target:
-    """Return the target, a language or a device, of that name. Raises `ValueError` with a hint if there is none."""
+    """Return the target with this name, a language or a device. Raises `ValueError` with a hint if there is none."""
     if name in DEVICES:
         return DEVICES[name]
     if name not in TARGETS:
@@ -116,9 +119,9 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """Return the name of the target that ``auto`` stands for: the first target that Python can load.
+    """Return the target that ``auto`` stands for: the first one that Python can load.
 
-    ``compiler`` says whether there is a C compiler; without one, targets that need it are left out.
+    ``compiler`` says whether there is a C compiler. Without a compiler, targets that need one are left out.
     """
     return next(name for name in LOADABLE if compiler or not TARGETS[name].compiled)
 
@@ -129,13 +132,14 @@ def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
 
 
 def loadable(targets: Iterable[str]) -> tuple[str, ...]:
-    """Return those names in ``targets`` whose solvers Python can load."""
+    """Return the names in ``targets`` whose solvers Python can load."""
     return tuple(target for target in targets if target in LOADABLE)
 
 
 def target_of(files: Iterable[str], name: str) -> Target:
-    """Return the target in whose language ``files`` are written; the name of the main file of the solver ``name``
-    decides.
+    """Return the target in whose language ``files`` are written. ``name`` is that of the solver.
+
+    The target is recognised by the name of the main file.
     """
     file_names = set(files)
     return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in file_names)

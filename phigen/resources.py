@@ -39,7 +39,8 @@ def bundled_name(file: str) -> str | None:
 
 
 def file_of(source: str) -> str:
-    """Return the path of a spec file: ``source`` if this is a file, or else the bundled spec with the name ``source``.
+    """Return the path of a spec file: ``source`` if this is a file, else the path of the bundled spec with this
+    name.
 
     If there is neither, ``source`` is returned unchanged.
     """
@@ -51,14 +52,16 @@ def file_of(source: str) -> str:
 
 
 def missing(source: str) -> Diagnostic:
-    """Return the error for a ``source`` that is neither a file nor the name of a bundled spec, with a hint."""
+    """Return the error, with a hint, for a ``source`` that is neither a file nor the name of a bundled spec."""
     also = "" if set(source) & {"/", "."} else ", and no bundled spec has that name"
     return Diagnostic(f"there is no file {source!r}{also}", hint=suggestion(source))
 
 
 def suggestion(source: str) -> str:
-    """Return a hint for a spec that was not found: a similar name of a spec or file, or the command that lists the
-    specs."""
+    """Return a hint for a spec that was not found.
+
+    It names a similar spec or file, or else the command that lists the specs.
+    """
     from difflib import get_close_matches
 
     path, names = Path(source), bundled()
@@ -76,8 +79,8 @@ def suggestion(source: str) -> str:
 
 
 def _find(name: str) -> Path:
-    # In a checkout the folder is beside the package. That place is tried second, since an unrelated folder beside an
-    # installed package may have the same name.
+    # In a checkout the folder is beside the package. The folder inside the package is tried first, since a folder
+    # beside an installed package may be an unrelated one with the same name.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
         if folder.is_dir():
             return folder

@@ -29,12 +29,13 @@ def propagator(
     t0: float | None = None,
     **shared: Any,
 ) -> Callable[..., Any]:
-    """Return the run of a solver as a function f(x0, parameters={}) of tensors, with gradients exact to round-off.
+    """Return the run of a solver as a function f(x0, parameters={}) of tensors, with gradients exact to
+    round-off.
 
     f returns the last state, of the same shape (…, DIM) as ``x0``. With a ``stride``, f returns all rows of
-    `Solver.integrate`, (…, rows, DIM). For a lattice, DIM stands for (coordinates, *sizes). ``parameters`` are tensors
-    by name, whose shapes broadcast to (…); missing ones have their defaults. Results have the precision and the device
-    of ``x0``.
+    `Solver.integrate`, (…, rows, DIM). For a lattice, DIM stands for (coordinates, *sizes). ``parameters`` maps names
+    to tensors whose shapes broadcast to (…); all other parameters have their defaults. Results have the precision and
+    the device of ``x0``.
 
     Gradients need a solver compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs. f
     raises `StepError` if a step fails.
@@ -50,7 +51,7 @@ def propagator(
 
 
 class _DifferentiableRun(torch.autograd.Function):  # type: ignore[misc]
-    """Function of PyTorch that integrates a run, and whose backward pass is the transposed derivative of the run."""
+    """Function of PyTorch that integrates a run. Its backward pass is the transposed derivative of the run."""
 
     @staticmethod
     def forward(runs: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:

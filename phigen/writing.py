@@ -1,7 +1,8 @@
-"""Atomic writing of files: a file, or several files together, are written completely or not at all.
+"""Atomic writing of files: one file, or several files together, are replaced completely or not at all.
 
-Contents are first written to temporary files in the same folder, which replace the files when all contents are on the
-disk. So readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name the file.
+Contents are first written to temporary files in the same folder. When all contents are on the disk, the temporary files
+replace the files. So readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name
+the file.
 """
 
 from __future__ import annotations
@@ -14,16 +15,16 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-#: Folders whose entries are devices or open file descriptors. The entries are written directly, since they cannot be
-#: replaced.
+#: Folders of devices and open file descriptors. These are written directly, since they cannot be replaced.
 _DEVICES = ("/dev/", "/proc/")
 
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
-    """Context in which errors of the operating system get ``path`` as the name of the file.
+    """Context in which errors of the operating system name ``path`` as the file.
 
-    Without it, errors of a full disk name no file, and errors of a temporary file name a file that users do not know.
+    Otherwise errors of a full disk would name no file, and errors of a temporary file would name a file that users do
+    not know.
     """
     try:
         yield
@@ -42,8 +43,10 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def write_all(contents: Mapping[Path, str | bytes]) -> None:
-    """Replace all files or none; missing folders are created. Raises `OSError` with the name of the file that
-    failed."""
+    """Replace all files or none, and create missing folders.
+
+    Raises `OSError` with the name of the file that failed.
+    """
     pending: list[_Pending] = []
     with ExitStack() as cleanup:
         for path, content in contents.items():
@@ -60,9 +63,9 @@ def write_all(contents: Mapping[Path, str | bytes]) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Context with a binary file to write, which replaces ``path`` at the end. Raises `OSError` with this path.
+    """Context with a binary file for writing. The file replaces ``path`` at the end.
 
-    If the body of the context raises an exception, ``path`` remains unchanged.
+    If the body of the context raises an exception, ``path`` remains unchanged. Raises `OSError` with this path.
     """
     pending = _Pending(path)
     try:
@@ -88,7 +91,7 @@ class _Pending:
         self._temporary = Path(temporary)
 
     def settle(self) -> None:
-        """Write buffered contents to the disk, so that an error of a full disk is raised now."""
+        """Write buffered contents to the disk. If the disk is full, the error is raised now."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
@@ -118,14 +121,15 @@ def _make_folder(folder: Path, cleanup: ExitStack) -> None:
 
 
 def _remove_folder(folder: Path) -> None:
-    with suppress(OSError):  # the folder is not empty: another process has created a file in it
+    with suppress(OSError):  # another process may have created a file in the folder
         folder.rmdir()
 
 
 def _mode(path: Path) -> int:
-    """Return the permissions of the file that is replaced or, if there is none, those of a new file.
+    """Return the permissions of the file that is replaced or, if there is none, those that a new file would
+    get.
 
-    The permissions must be set explicitly, since mkstemp creates temporary files that only their owner can read.
+    They must be set explicitly, since mkstemp creates temporary files that only their owner can read.
     """
     try:
         return path.stat().st_mode & 0o777
@@ -136,6 +140,6 @@ def _mode(path: Path) -> int:
 
 
 def _encoded(content: str | bytes) -> bytes:
-    # A text may contain names of files that are no valid UTF-8. Python represents their bytes by surrogates, which are
+    # A text may contain file names that are not valid UTF-8. Python represents such bytes by surrogates, which are
     # written as escapes.
     return content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
