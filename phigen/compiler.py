@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: To estimate the costs of a series of high order, which takes long to build, a series of this order is built. Its
-#: number of operations is a lower bound.
+#: Order of the series from which the cost of a series of higher order is estimated. Its number of operations is a lower
+#: bound for that of the longer series, which would take long to build.
 PREVIEW_ORDER = 4
 
-#: A spec that writes out the equations of all sites of a lattice is recognised if there are at least this many sites.
-#: Specs with fewer coordinates are not examined.
+#: Least number of sites of a lattice that is recognised if a spec writes out the equations of all its sites. Specs with
+#: fewer coordinates are not examined.
 LEAST_LATTICE_SITES = 8
 
 

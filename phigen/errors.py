@@ -139,7 +139,7 @@ class MissingPackageError(PhigenError):
 
 
 class FileError(PhigenError):
-    """A file that the user named cannot be written, or has not the contents that are needed."""
+    """A file that the user named cannot be written, or lacks the contents that are needed."""
 
     exit_code = 2
 

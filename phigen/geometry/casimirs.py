@@ -3,10 +3,11 @@
 Candidates come from these sources, in this order:
 
 - the Casimirs that define a Nambu bracket
+- the Casimirs of the blocks of a product, and those of a pull-back in the other coordinates
 - linear functions, from the kernel of a constant π
 - monomials x^u, from the kernel of the matrix A of a log-canonical π
+- on the dual of a matrix algebra with a non-degenerate trace form: polynomials of degree up to 3, then traces tr X^m
 - polynomials of increasing degree, by linear algebra
-- traces tr X^m, on the dual of a matrix algebra with a non-degenerate trace form
 
 A candidate that depends on declared or earlier Casimirs is dropped. `phigen.geometry.checks` proves that each result is
 a Casimir.

@@ -1,5 +1,6 @@
 """Statements about the mathematics of a system, with verdicts: skew symmetry, Jacobi identity, Casimirs, invariants,
-rank."""
+forces, noise, and the rank of π.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Name of the statement that the noise sources commute, so that the strong order is 1.
+#: Name of the statement that the sources of noise commute. The strong order is then 1.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 

@@ -28,8 +28,9 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     """Yield a statement for each part of a system that seems to be undefined everywhere.
 
     The parts are H, π, the forces, the noise, and each Casimir and invariant. ``starts`` has the values of coordinates
-    and parameters at the starts of runs. The statement that a part is defined is refuted if the part divides by 0. It
-    is also refuted if the part has no value at any sample point and at any start. Without starts, it is then undecided.
+    and parameters at the starts of runs. The statement that a part is defined is refuted if the part divides by 0. If
+    the part has no value at any of the sample points and starts, the statement is refuted too, or undecided if there
+    are no starts.
     """
     for name, roots in _parts(system).items():
         divisor = _divided_by_zero(roots, system.positive)

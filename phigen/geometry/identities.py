@@ -17,8 +17,8 @@ from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 #: Largest degree of polynomials that are recognised. The entries of constant, linear and log-canonical tensors π have
 #: degree ≤ 2.
 DEGREE = 2
-#: Pairs (a, b), for the points (a, a + b, a + 2b, …). At the first point where this is possible, the function is
-#: expanded in a Taylor polynomial. Many functions have rational values at the first two points.
+#: Each pair (a, b) stands for the point (a, a + b, a + 2b, …). The function is expanded in a Taylor polynomial at the
+#: first of these points where this is possible. Many functions have rational values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
 #: Largest number of lines that are tried. The search ends at the first line on which the function has values.
 _LINES = 8

@@ -22,10 +22,10 @@ class _Row(Generic[Key]):
 
 
 class Span(Generic[Key]):
-    """The span of some sparse vectors (key → nonzero scalar). It computes coordinates of elements in terms of these
-    vectors.
+    """The span of some sparse vectors (key → nonzero scalar).
 
-    ``dependent`` has the positions of those vectors that are linear combinations of earlier ones.
+    The method `coordinates` expresses an element of the span by these vectors. ``dependent`` has the positions of the
+    vectors that are linear combinations of earlier ones.
     """
 
     def __init__(self, field: Field, vectors: Iterable[Mapping[Key, Scalar]]) -> None:

@@ -1,4 +1,4 @@
-"""Lie algebras from matrices or structure constants of specs. It is checked that these define a Lie algebra."""
+"""Lie algebras from matrices or structure constants of specs, after a test that they define a Lie algebra."""
 
 from __future__ import annotations
 
@@ -84,8 +84,8 @@ def from_structure_constants(
 ) -> LieAlgebra:
     """Return the Lie algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k, with indices from 0.
 
-    The bracket of a pair may be given in one order or in both. Raises `SpecError` for indices out of range, for
-    brackets that contradict antisymmetry, and for the first triple for which the Jacobi identity fails.
+    The bracket of a pair may be given in one order or in both. Raises `SpecError` for indices out of range, and for
+    brackets that contradict antisymmetry. If the Jacobi identity fails, raises `SpecError` for the first triple.
     """
     indices = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
     if indices and max(indices) >= dimension:

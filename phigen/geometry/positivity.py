@@ -1,4 +1,4 @@
-"""Statements that an expression is positive, or nowhere negative. They are decided by its form, or at the starts of
+"""Statements that an expression is positive, or nowhere negative, with a proof by its form or a check at starts of
 runs.
 """
 

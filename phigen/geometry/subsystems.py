@@ -36,7 +36,7 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 def block_of(system: System, indices: Sequence[int]) -> System:
     """Return a system with H = 0 for a block of π; ``indices`` are those of the coordinates of the block.
 
-    The form of its π is the form that the spec states for this block or, if there is none, the matrix of the block.
+    The system has the form of π that the spec states for this block or, if there is none, the matrix of the block.
     """
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):

@@ -84,8 +84,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
 
 
 def _rational(e: Any) -> Fraction:
-    """Return a sympy number as a fraction. Raises `LimitError` for numbers with sizes or lengths that specs do not
-    allow.
+    """Return a sympy number as a fraction. Raises `LimitError` for a number that is too large or too long for a
+    spec.
     """
     # The size is checked before the conversion: as a fraction, a Float of 1e999999 has a million digits.
     if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):

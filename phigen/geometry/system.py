@@ -31,12 +31,12 @@ _SHOWN = 60
 class System:
     """A system ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and with sources of ``noise``.
 
-    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}. The symbols of all expressions are coordinates and parameters.
-    ``shape`` is the recognised shape of π, and ``form`` its form in the spec. ``casimirs`` has the declared Casimirs in
-    the order of the spec, then those that phigen found (``C1``, ``C2``, …). ``declared`` has the names of the declared
-    Casimirs. ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities
-    to record; nothing is proved about them. ``notes`` says which searches were omitted, and why. ``spec`` is the spec
-    of the system, or None if the system was built in Python.
+    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}. The symbols of all expressions are coordinates, parameters and the
+    time. ``shape`` is the recognised shape of π, and ``form`` its form in the spec. ``casimirs`` has the declared
+    Casimirs in the order of the spec, then those that phigen found (``C1``, ``C2``, …). ``declared`` has the names of
+    the declared Casimirs. ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables``
+    are quantities to record; nothing is proved about them. ``notes`` says which searches were omitted, and why.
+    ``spec`` is the spec of the system, or None if the system was built in Python.
     """
 
     name: str

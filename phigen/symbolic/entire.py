@@ -1,4 +1,4 @@
-"""Entire functions in which exact flows are written, so that no formula divides by a frequency that may be 0.
+"""Entire functions for the formulas of exact flows. They avoid divisions by a frequency, which may be 0.
 
 - ``cosroot``(s) = cos √s and ``sinroot``(s) = sin(√s)/√s or, for s < 0, cosh √−s and sinh(√−s)/√−s. With these two
   functions, one formula holds for rotations and for hyperbolic motions. They satisfy cosroot² + s·sinroot² = 1

@@ -137,7 +137,7 @@ _LISTED = (
         known=lambda call, a: call("log", 1 + a),
         written=_library("log1p"),
     ),
-    Function(  # 1/a for a > 0, else NaN: if a reaches 0, a flow with this factor has no values from then on
+    Function(  # 1/a for a > 0, else NaN: a flow with this factor ends where a reaches 0
         "inv",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),

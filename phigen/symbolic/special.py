@@ -1,7 +1,7 @@
 """The function φ of the exponential bi-realisation, and its first two derivatives.
 
 φ(s) = (1 − w cot w)/s with w = √s/2. The function is analytic at s = 0 and for s < 0, where cot becomes coth. Its poles
-are s = 4π²n² for n ≥ 1. It occurs in the even part of z/(1 − e^{−z}), which is (z/2) coth(z/2) = 1 + z² φ(−z²).
+are s = 4π²n² for n ≥ 1. φ occurs in the even part of z/(1 − e^{−z}), which is (z/2) coth(z/2) = 1 + z² φ(−z²).
 
 - φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
 - sφ' = 1/8 − (3/2)φ + ½sφ² (Riccati), hence (n + 3/2) a_n = ½ Σ_{i+j=n−1} a_i a_j, a_0 = 1/12
@@ -45,10 +45,10 @@ def order_of(name: str) -> int:
 
 
 def coefficient(order: int, n: int) -> Fraction:
-    """Return the exact coefficient of sⁿ in the Taylor series of the derivative of φ of this ``order``.
+    """Return the exact coefficient of sⁿ in the Taylor series of φ or, for the ``order`` 1 or 2, of its
+    derivative.
 
-    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation. For the order
-    0 the derivative is φ itself.
+    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation.
     """
     return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
 

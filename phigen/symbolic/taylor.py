@@ -97,11 +97,10 @@ class ExpressionRing(Arithmetic[Expression]):
 
 
 def closure(roots: Sequence[Expression]) -> list[Expression]:
-    """Return all nodes whose series are needed for the series of the expressions. Arguments come before the nodes that
-    use them.
+    """Return all nodes whose series are needed for the series of the expressions.
 
-    They are the nodes of the expressions and, since the series of f(a) is computed from that of f'(a), the nodes of the
-    partial derivatives of functions.
+    The nodes are those of the expressions and those of partial derivatives, since the series of f(a) is computed from
+    that of f'(a). Arguments come before the nodes that use them.
     """
     closed = list(roots)
     while True:
