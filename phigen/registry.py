@@ -119,7 +119,7 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """Return the target that ``auto`` stands for: the first one that Python can load.
+    """Return the name of the target that ``auto`` stands for: the first target that Python can load.
 
     ``compiler`` says whether there is a C compiler. Without a compiler, targets that need one are left out.
     """

@@ -27,7 +27,7 @@ class BiRealisation:
 
     - ``displacement``: α − x, in a form in which no terms of the size of x cancel
     - ``increment``: β − α, in a form with the same property
-    - ``symmetric``: whether β(x, p) = α(x, −p), which is proved
+    - ``symmetric``: whether β(x, p) = α(x, −p)
     - ``exact``: false for a truncated series. Its steps are Poisson maps only up to a power of the step size
     - ``degree``: for a truncated series, the degree in p up to which α and β are correct; their brackets are correct up
       to one degree less
