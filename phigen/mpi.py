@@ -244,7 +244,7 @@ class _Domain:
         if planes < count * max(reach, period):
             most = planes // max(reach, period)
             raise ValueError(
-                f"{planes} planes are too few for {count} processes; at most {most} processes are possible"
+                f"{planes} sites along the first axis are too few for {count} processes; at most {most} are possible"
             )
         units = -(-planes // period)
         first, end = (min(planes, units * r // count * period) for r in (rank, rank + 1))

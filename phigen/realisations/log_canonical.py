@@ -1,6 +1,6 @@
 """Bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j.
 
-It is α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j) with u_j = Σ_i a_ij x_i p_i. The article `PAPER` in
+The maps are α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j) with u_j = Σ_i a_ij x_i p_i. The article `PAPER` in
 `phigen.realisations.protocol` prints α with the opposite sign in the exponent, but its Lotka–Volterra scheme has the
 sign that is used here.
 """

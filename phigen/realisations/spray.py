@@ -216,7 +216,7 @@ def _degree(system: System, choice: BirealisationChoice) -> int:
         return least + 2
     if choice.degree < least:
         raise refuse(
-            f"degree {choice.degree} is too small for order {order}, which takes α and β up to degree {least} in p",
+            f"degree {choice.degree} is too small for order {order}, which needs α and β up to degree {least} in p",
             f"degree: {least + 2} makes a step a Poisson map up to O(h^{least + 3})",
         )
     return choice.degree
