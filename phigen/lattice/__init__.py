@@ -1,3 +1,1 @@
-"""Lattices: systems of many identical sites. One site describes a lattice of any size: fields, brackets, energies,
-step.
-"""
+"""Lattices: systems of many identical sites. The description of one site is enough for a lattice of any size."""

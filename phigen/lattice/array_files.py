@@ -28,9 +28,7 @@ ENDS = ("a", "b")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The numbers of a ``.csv`` file as ``rows``, and the column ``names`` of its first line; () if this line has
-    numbers.
-    """
+    """The numbers of a ``.csv`` file as ``rows``, and the column ``names`` in its first line; () if it has no names."""
 
     path: Path
     names: tuple[str, ...]

@@ -12,14 +12,12 @@ from phigen.lattice.cell import GRID, Cell
 from phigen.symbolic.expression import ONE, Expression, fold, gradient, mul, power, product, rebuild, symbol
 from phigen.symbolic.neighbours import ENDS
 
-#: Expression as a pair: a factor without powers of some symbols, and the exponents of these powers.
+#: Expression as a product of powers of certain symbols and one other factor: this factor, and the exponents by symbol.
 Factored = tuple[Expression, Mapping[str, int]]
 
 
 def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
-    """Return the expressions with powers of symbols combined in each product, as in m·m⁻¹ = 1, for the symbols
-    ``names``.
-    """
+    """Return the expressions with the powers of each symbol in ``names`` combined, so that m·m⁻¹ becomes 1."""
     return [_multiplied(f) for f in _factored(values, names)]
 
 
@@ -46,12 +44,12 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 
 @dataclass(frozen=True)
 class SumFactors:
-    """The common factor of all forces of bonds or pairs on one field: a product of powers of those parameters at sites
-    that may be 0.
+    """The common factor of all forces of bonds or pairs on one field.
 
-    The sums over bonds and pairs are computed without this factor, and multiplied by ``at_site``, which is the factor
-    at the site of the sum. ``at_end`` has the exponents of the powers by the symbols of the parameters at the end of a
-    bond, such as ``m[a]``.
+    It is a product of powers of parameters at sites, of those parameters that may be 0. The factor is divided out of
+    the sums over bonds and pairs, and the sums are multiplied by it afterwards. ``at_site`` is the factor at the site
+    of the sum. ``at_end`` maps the symbols of the parameters at the end of a bond, such as ``m[a]``, to their exponents
+    in the factor.
     """
 
     at_site: Expression = ONE

@@ -1,4 +1,4 @@
-"""One cell of a lattice, the description of one site: fields, brackets with neighbours, and the energy density.
+"""The description of one site of a lattice, its cell: fields, brackets with neighbours, and energy density.
 
 Values at neighbours are ordinary symbols of expressions. On a grid, ``x[i-1,j+2]`` is x at the site with the offset −1
 along the axis i and 2 along the axis j. Axes come in their order, and axes with the offset 0 are left out: ``x[i+1]``
@@ -27,17 +27,17 @@ class Cell:
     """A lattice of identical sites, defined by its fields, brackets and energy densities at one site.
 
     ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` for each axis.
-    Graphs and pairs have neither. ``bracket`` maps a pair of symbols, f at the site and g at an offset, to {f, g}; it
-    has all nonzero brackets, in both orders. ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their
-    bracket along a bond. ``hamiltonian`` is the energy density of a site, ``bond_hamiltonian`` the energy of a bond
-    from a to b, and ``pair_hamiltonian`` the energy of a pair. H is the sum of these over all sites, bonds and pairs,
-    without the `terms` that reach beyond an open end.
+    Graphs and pairs have neither. ``bracket`` maps (f, g) to {f, g}, where f is a field at the site and g the symbol of
+    a field at the site or at a neighbour. It contains all nonzero brackets, in both orders. ``bond_bracket`` maps
+    ("f[a]", "g[b]") and ("g[b]", "f[a]") to the bracket along a bond. ``hamiltonian`` is the energy density of a site,
+    ``bond_hamiltonian`` the energy of a bond from a to b, and ``pair_hamiltonian`` the energy of a pair. H is the sum
+    of all three over all sites, bonds and pairs. Terms that reach beyond an open end are left out (see `terms`).
 
     ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
     ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
     ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site. ``observables`` are
-    fields, or densities that ``reductions`` turn into numbers. ``derived`` are values at sites that a solver computes
-    from the parameters.
+    fields or densities; ``reductions`` says how a density becomes one number, such as a sum over the sites. ``derived``
+    are values at sites that a solver computes from the parameters.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Cell:
 
     @property
     def vanishing(self) -> frozenset[str]:
-        """The parameters at sites whose values may be 0, that is, those not declared positive."""
+        """The parameters at sites that may be 0, which are those not declared positive."""
         return frozenset(p.name for p in self.parameters if p.at == "sites" and not p.positive)
 
     @property
@@ -152,16 +152,16 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the smallest and the largest offset along each axis among the site itself and all symbols of an
-        expression.
+        """Return the smallest and the largest offset along each axis of the sites that an expression reads; the site
+        itself, with the offset 0, is included.
         """
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """The largest distance along each axis between two sites of one bracket {f, g}. The sites of a bracket are that
-        of f, that of g, and those of the symbols in its value.
+        """The largest distance along each axis from the site of f to another site of a bracket {f, g}. This may be the
+        site of g, or a site that the value of the bracket depends on.
         """
         second_fields = [symbol(other) for _, other in self.bracket]
         return self._reach([*second_fields, *self.bracket.values()])
@@ -222,9 +222,10 @@ def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
 
 
 def forces(cell: Cell) -> dict[str, Expression]:
-    """Return ∂H/∂f at a site for each field f, from the energy densities of sites, for sites away from open ends.
+    """Return ∂H/∂f at a site away from open ends, for each field f.
 
-    On graphs and for pairs, the contributions of bonds and pairs are left out; `bond_forces` returns these.
+    On graphs and for pairs, only the energy densities of sites contribute; `bond_forces` has the forces of bonds and
+    pairs.
     """
     if cell.relation != GRID:
         return dict(zip(cell.fields, gradient(cell.hamiltonian, cell.fields), strict=True))

@@ -15,7 +15,8 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size in a run that is not a multiple of the period with which the colours of sites repeat along its axis.
+    """A size in a run that does not fit the colours of sites: it is not a multiple of their period along the
+    axis.
 
     ``fitting`` is a multiple of the period near ``size``.
     """
@@ -31,7 +32,8 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Error for runs with sizes that are not multiples of the periods with which the colours of sites repeat.
+    """Error for runs whose sizes do not fit the colours of sites, that is, are not multiples of the periods of the
+    colours.
 
     ``reason`` names these sizes in one line.
     """
@@ -91,15 +93,17 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
 
 
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
-    """Raise `MisfitError` for runs whose sizes are not multiples of ``periods``, with which the colours of sites
-    repeat.
+    """Raise `MisfitError` if a size of a run is not a multiple of the period of the colours. ``periods`` has the period
+    along each axis.
     """
     if wrong_sizes := misfits(spec, cell, periods):
         raise MisfitError(misfit_diagnostics(spec, wrong_sizes))
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
-    """Return the sizes of all runs that are not multiples of ``periods``, with which the colours of sites repeat."""
+    """Return the sizes in all runs that are not multiples of the period of the colours. ``periods`` has the period
+    along each axis.
+    """
     return [
         Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
         for run in spec.runs.values()
@@ -123,10 +127,11 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line that names all sizes which do not fit the colours of sites, for the header of generated files.
+    """Return one line for the header of generated files: it names all sizes that do not fit the colours of
+    sites.
 
-    It says that a splitting with this number of ``colours`` needs multiples of the periods of the colours. It is "" if
-    there is no wrong size.
+    The line says that a splitting with this number of ``colours`` needs other sizes, and gives examples. If there are
+    no ``wrong_sizes``, the result is "".
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
@@ -134,10 +139,10 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line that names all sizes that need a boundary seam, and near each of these a size that needs
-    none.
+    """Return one line for the header of generated files: it names all sizes that need a boundary seam.
 
-    A seam is needed if a size is not a multiple of the period with which the colours of sites repeat.
+    A seam is needed if a size is not a multiple of the period of the colours. For each such size, the line also names a
+    multiple near it.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"

@@ -1,9 +1,10 @@
-"""Bi-realisations on a lattice: α and β at a site depend on covectors p in its neighbourhood.
+"""Bi-realisations (α, β) on a lattice: α and β at a site depend on covectors p in its neighbourhood.
 
-If brackets are between fields of one site only, any symmetric bi-realisation in closed form of the system of one site
-can be used. If π couples neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f.
-Let π' and p' be π and the covector in these coordinates, and D = π'p', a sum over neighbouring sites. Then α = φ⁻¹(φ −
-½D) and β = φ⁻¹(φ + ½D). This covers constant π, log-canonical π, and the brackets of the Toda lattice.
+Suppose that brackets are between fields of one site only. Then one site is a system of its own, and any symmetric
+bi-realisation of this system in closed form can be used. If π couples neighbours, it must be constant after a change of
+coordinates that replaces each field f by φ(f), where φ(f) is f or log f. Let π' and p' be π and the covector in the new
+coordinates, and D = π'p', a sum over neighbouring sites. Then α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). This covers constant
+π, log-canonical π, and the brackets of the Toda lattice.
 """
 
 from __future__ import annotations
@@ -57,10 +58,10 @@ class CellRealisation:
 
     @cached_property
     def middle(self) -> dict[str, Expression]:
-        """The solution y of the implicit equation α(y, p) = x at a site, by field, with the symbols `initial` for x at
-        this site.
+        """The formula for y at a site, by field, where y solves α(y, p) = x. The symbols `initial` stand for x at the
+        site.
 
-        The formula is explicit if α is affine in y. Otherwise y also occurs on its right-hand side.
+        The formula is explicit if α is affine in y. Otherwise the formula contains y itself.
         """
         fields, values = list(self.displacement), list(self.displacement.values())
         slopes = [gradient(e, fields) for e in values]
@@ -127,8 +128,9 @@ def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
 
 
 def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expression]] | None:
-    """Return the fewest fields whose logarithms make all brackets constant, and the constant brackets; None if there
-    are none.
+    """Return the smallest set of fields whose logarithms make all brackets constant, and the constant brackets.
+
+    Returns None if there is no such set.
     """
     for count in range(len(cell.fields) + 1):
         for logarithmic in itertools.combinations(cell.fields, count):

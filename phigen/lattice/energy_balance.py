@@ -1,9 +1,9 @@
 """The energy balance of a driven lattice: H − ∫ P dt is constant along the motion, whereas H is not.
 
-P = dH/dt is a sum over sites, bonds and pairs: the change of each density along the motion, plus its derivative with
-respect to time. The Hamiltonian vector field itself contributes nothing to the sum. P is evaluated after every step,
-and polynomials that interpolate eight neighbouring values are integrated. So the accuracy does not depend on the number
-of steps between two stored states.
+The power P = dH/dt is a sum over sites, bonds and pairs. Each summand is the derivative of an energy density along the
+motion, plus its derivative with respect to time. P is evaluated after every step, also between stored states, and
+integrated by polynomials through eight neighbouring values. So the accuracy does not depend on how often states are
+stored.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of,
 from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import VARIATION, Symbol, variation
 
-#: Numbers of nodes of the interpolating polynomials. The error of the fine integral is estimated by its difference from
-#: the coarse integral.
+#: Numbers of nodes of the polynomials that interpolate the power. The polynomials with FINE_NODES give the integral;
+#: its difference from the integral with COARSE_NODES is an estimate of the error.
 FINE_NODES, COARSE_NODES = 8, 6
 
 
@@ -77,16 +77,17 @@ def _variations(term: Expression) -> Iterator[Symbol]:
 
 
 def shifted(array: Floats, offset: Offset) -> Floats:
-    """Return an array whose entry at each site is the entry of ``array`` at the site that is ``offset`` away; axes wrap
+    """Return ``array`` shifted by −``offset``: each site gets the entry of the site that is ``offset`` away. Axes wrap
     around.
     """
     return np.roll(array, [-int(o) for o in offset], tuple(range(array.ndim))) if offset else array
 
 
 def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
-    """Return a mask (*sizes) of the sites at which a term of a density fits between open ends.
+    """Return a mask that is true at each site at which a term of a density does not reach beyond open ends.
 
-    ``extent`` has the smallest and the largest offset of the sites that the term reads, along each axis.
+    The mask has the shape ``sizes``. ``extent`` has the smallest and the largest offset of the sites that the term
+    reads, along each axis.
     """
     mask = np.ones(tuple(sizes), dtype=bool)
     if cell.relation != GRID:
@@ -103,17 +104,17 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
     """Return the integrals of the power P from the first time to later times, and an estimate of their error.
 
-    ``values`` (steps + 1,) are P at times ``h`` apart. Without ``row_positions`` there is an integral to each of these
-    times. With ``row_positions`` (rows,), there is an integral to each position. A position is a time since the first
-    time in units of ``h``, not necessarily a whole number. An integral beyond the last value extrapolates the last
-    polynomial.
+    ``values`` has P at equidistant times, ``h`` apart; there is one integral for each of these times. If
+    ``row_positions`` is passed, there is one integral for each of its entries instead. An entry is a time after the
+    first time in units of ``h``, not necessarily a whole number. Beyond the last value, the last polynomial is
+    extrapolated.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
 def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
-    """Return the integrals of the power as `integral` does, by polynomials through ``count`` neighbouring values."""
+    """Return the integrals that `integral` describes, by polynomials through ``count`` neighbouring values."""
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
@@ -126,10 +127,11 @@ def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | 
 
 
 def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
-    """Return the integral of ``values`` over each interval, by the polynomial through the ``count`` values around it.
+    """Return the integral of a function over each of several intervals.
 
-    ``stencil_starts`` are the indices of the values at which intervals begin. ``lengths`` of intervals are in units of
-    the distance between two values.
+    ``values`` has the function at equidistant points. On each interval, the polynomial through the ``count`` nearest
+    points is integrated. An interval begins at the point whose index is in ``stencil_starts``. Its length, in
+    ``lengths``, is in units of the distance between two points.
     """
     count = min(count, len(values))
     starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)

@@ -24,10 +24,11 @@ Site = tuple[int, ...]
 class Expansion:
     """A lattice of given sizes as an ordinary system, with all sites written out.
 
-    ``bonds`` are pairs of sites of a graph. Graphs and pairs have one size, the number of sites. ``names`` maps (field
-    or parameter, site) to a coordinate or parameter of the ordinary spec; ``bond_names`` maps (parameter, index of the
-    bond) to a parameter. Coordinates are ordered by field, then by site with the last axis fastest, so a state of shape
-    (fields, *sizes), flattened, is a state of the ordinary system.
+    ``bonds`` has the pairs of sites that the bonds of a graph connect. Graphs and pairs have one size, the number of
+    sites. ``names`` maps (field or parameter, site) to the name of a coordinate or parameter of the ordinary spec.
+    ``bond_names`` maps (parameter, index of the bond) to the name of a parameter. Coordinates are ordered by field,
+    then by site with the last axis fastest. So an array of the shape (fields, *sizes), flattened, is a state of the
+    ordinary system.
     """
 
     cell: Cell
@@ -154,7 +155,7 @@ class Expansion:
         return SpecForces(covector, vector, damping)
 
     def _field(self) -> dict[tuple[str, Site], Expression]:
-        """Return the vector field π∇H: its component by field and site."""
+        """Return the components of the vector field π∇H, by field and site."""
         slopes = dict(zip(self.coordinates, gradient(total(self.hamiltonian_terms()), self.coordinates), strict=True))
         rates: dict[str, list[Expression]] = {c: [] for c in self.coordinates}
         for (a, b), entry in self.poisson().items():
@@ -186,8 +187,8 @@ class Expansion:
         return MatrixForm(tuple(tuple(entries.get((a, b), ZERO) for b in self.coordinates) for a in self.coordinates))
 
     def spec(self) -> Spec:
-        """Return the ordinary spec. Each parameter at a site or a bond becomes a number, with the default of the
-        cell.
+        """Return the ordinary spec. Each parameter with a value at every site or bond becomes one parameter for each
+        site or bond.
         """
         cell = self.cell
         parameters: list[Parameter] = []
@@ -212,8 +213,9 @@ class Expansion:
         )
 
     def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
-        """Return the values of the parameters of the ordinary spec, from the numbers and arrays that a lattice solver
-        receives.
+        """Return the numbers that the parameters of the ordinary spec have, by name.
+
+        ``parameters`` are those of a lattice solver: numbers, and arrays over sites or bonds.
         """
         numbers = {}
         for p in self.cell.parameters:
@@ -250,15 +252,16 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
 
 
 def ring(sites: int) -> list[tuple[int, int]]:
-    """Return bonds that form a ring with a chord: an example graph for lattices for which the user gives no graph."""
+    """Return bonds that form a ring with a chord. This graph is used as an example if the user gives no graph."""
     chord = [(0, sites // 2)] if sites > 3 else []
     return [(k, (k + 1) % sites) for k in range(sites if sites > 2 else sites - 1)] + chord
 
 
 def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
-    """Return a run of the ordinary spec, from the initial state and the parameters of a run of the lattice.
+    """Return a run of the ordinary spec with the same data as a run of the lattice.
 
-    Sections and stops are left out: they refer to observables, which the ordinary spec does not have.
+    ``state`` is the initial state of the lattice, and ``numbers`` are the parameters of the ordinary spec. Sections and
+    stops are left out: they refer to observables, which the ordinary spec does not have.
     """
     return replace(
         run,

@@ -35,10 +35,10 @@ from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import CHOSEN, GATHERED, Symbol, kind_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Sites at which the terms of a part read a field: all sites; the sites of the colour of the part; all other sites.
+#: Sites, in relation to the colour of a part: any site, a site of the colour, a site of another colour.
 ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
-#: Classes of terms in a part: at all sites and bonds; at bonds that begin at sites of one colour; at bonds that end
-#: there.
+#: Classes of terms in a part: terms at all sites and bonds; terms at bonds that begin at sites of one colour; terms at
+#: bonds that end at sites of one colour.
 WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
 #: The end of a bond that has the colour of the part, for each class of terms.
 _CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
@@ -50,7 +50,8 @@ _OTHER = {"a": "b", "b": "a"}
 class GraphSearch(PartSearch):
     """Search for the parts of H on a graph, whose colours are known only at run time.
 
-    A term in a part is a pair: the summand of H, and in place of a colour the class `WHOLE`, `BEGINS` or `ENDS_THERE`.
+    A term in a part is a pair: the summand of H, and its class `WHOLE`, `BEGINS` or `ENDS_THERE`, which takes the place
+    of a colour.
     """
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)
@@ -97,7 +98,10 @@ class GraphSearch(PartSearch):
         return sorted({(f, site_numbers.get(o, ANYWHERE)) for f, o in places if f in self.cell.fields})
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether two coordinates may have a nonzero bracket, at one site or along a bond."""
+        """Whether two coordinates may have a nonzero bracket, at one site or along a bond.
+
+        A coordinate is a pair: a field, and `ANYWHERE`, `INSIDE` or `OUTSIDE` for its site.
+        """
         same_site_possible = a[1] == b[1] or ANYWHERE in (a[1], b[1])
         different_sites_possible = not (a[1] == b[1] == INSIDE)
         local = same_site_possible and any(g == b[0] for g, _ in self._couples.get(a[0], ()))
@@ -178,9 +182,10 @@ class _SiteEquation:
         return sums
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
-        """Return the sums over bonds that come from brackets along bonds, and add their contributions to ``rates``.
+        """Return the sums over bonds that brackets along bonds cause in the equation of motion, and add their terms to
+        ``rates``.
 
-        A rate is a sum of products: a monomial in the fields of this site times a sum over the neighbours.
+        Each term is the product of a monomial in the fields of this site and a sum over the neighbours.
         """
         selection = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
@@ -223,10 +228,10 @@ def energies(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def site_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over bonds or pairs of the forces on a site.
+    """Return the sums of the forces that bonds or pairs exert on a site.
 
-    If there are brackets along bonds, they are sums of rates of change instead. Forces on fields without brackets are
-    left out, since they have no effect.
+    If there are brackets along bonds, rates of change are summed in place of forces. Forces on fields without brackets
+    are left out, since they have no effect.
     """
     if cell.relation == PAIRS:
         return merged_ends([BondSum(_moving_forces(cell, cell.pair_hamiltonian, "a"))])
@@ -239,11 +244,11 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def sums_by_field(cell: Cell) -> dict[str, Expression]:
-    """Return, for each field, the contribution of all bonds or pairs to the force on the field; zeros are left
-    out.
+    """Return the force that all bonds or pairs exert on each field of a site; fields without such a force are
+    left out.
 
-    It is the symbol of a sum times its `SumFactors`. With brackets along bonds, it is the contribution to the rate of
-    change.
+    The force is the symbol of a sum, times the common factor of the summands (see `SumFactors`). If there are brackets
+    along bonds, the result has rates of change in place of forces.
     """
     names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
     at_site = {f: sum_factors(cell, f).at_site for f in cell.fields if _gathered(f) in names}
@@ -251,7 +256,7 @@ def sums_by_field(cell: Cell) -> dict[str, Expression]:
 
 
 def field_with_sums(cell: Cell) -> list[Expression]:
-    """Return the vector field at a site, with symbols for the sums over bonds or pairs in place of these sums."""
+    """Return the components of the vector field at a site. Symbols stand for the sums over bonds or pairs."""
     sums = sums_by_field(cell)
     if not cell.bond_bracket:
         return list(field_at_site(cell, sums))
@@ -268,9 +273,9 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 
 
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
-    """Return the sums of the two ends of a bond as a single one, if they are proved to be equal; else return both.
+    """Return the sums for the two ends of bonds as a single element if their summands are proved to be equal.
 
-    Sums that are 0 are left out. Two sums with ``chosen`` equal to ``here`` stay separate.
+    Otherwise both are returned. Sums that are 0 are left out. Sums with ``chosen`` = "here" stay separate.
     """
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
@@ -292,13 +297,16 @@ def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expressio
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the forces of a bond on a site that occur in the vector field; see `_forces_at`."""
+    """Return the forces that a bond exerts on a site, as `_forces_at`, without those that do not occur in the vector
+    field.
+    """
     read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
     return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:
-    """Yield factors whose products sum to a rate of change: a monomial in the fields of this site, and its coefficient.
+    """Yield the terms of a rate of change, each as a pair: a monomial in the fields of this site, and its
+    coefficient.
 
     The monomial is written in the symbols of a site. The coefficient may depend on the opposite end of the bond.
     """

@@ -26,8 +26,8 @@ class LatticeSystem:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError`. For attributes that only a `System` has, its message says what to use for a
-            lattice.
+            """Raise an `AttributeError`. If a `System` has the attribute, the message says what to use for a lattice
+            instead.
             """
             raise missing_attribute(self, name)
 

@@ -12,17 +12,18 @@ from phigen.symbolic.arrays import Floats
 #: Largest number of sites that are placed. Time and memory grow with the square of this number, and 600 sites take some
 #: seconds.
 MOST_PLACED = 600
-#: Number of iterations of stress majorisation. Each iteration decreases the deviation of distances from numbers of
-#: bonds.
+#: Number of iterations of stress majorisation. Each iteration decreases the deviation of distances in the plane from
+#: numbers of bonds.
 ROUNDS = 60
 
 
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
-    """Return positions (sites, 2) in the unit square, or None for more than `MOST_PLACED` sites.
+    """Return positions of the sites in the unit square, of shape (sites, 2), or None for more than
+    `MOST_PLACED` sites.
 
-    The first positions are the classical scaling of distances along ``bonds`` (bonds, 2), with the two largest
-    eigenvalues. Iterations of stress majorisation improve them: J. de Leeuw, Applications of convex analysis to
-    multidimensional scaling (1977). The same bonds give the same positions.
+    The starting positions are the classical scaling of distances along ``bonds``, with the two largest eigenvalues.
+    Iterations of stress majorisation improve the positions: J. de Leeuw, Applications of convex analysis to
+    multidimensional scaling (1977). The same bonds always give the same positions.
     """
     if sites > MOST_PLACED:
         return None

@@ -1,9 +1,11 @@
-"""Statements about lattices of every size at once, by translation: brackets, Jacobi identity, Casimirs, invariants.
+"""Statements about lattices of every size at once, by translation: brackets, Jacobi identity, Casimirs,
+invariants.
 
 On a grid the statements are decided on the infinite lattice. A periodic box is a quotient of the infinite lattice by
-translations, so statements on brackets and sums are true on the box too. With open ends, the functions of the sites on
-the lattice are usually closed under brackets, so the Jacobi identity and Casimirs of single sites remain true. Casimirs
-and invariants that are sums are examined on a box so large that no term reaches both ends.
+translations, so statements on brackets and sums are true on the box too. A lattice with open ends is a part of the
+infinite lattice. If the functions on this part are closed under brackets, which is the usual case, the Jacobi identity
+and Casimirs of single sites remain true. Casimirs and invariants that are sums are examined on a box so large that no
+term reaches both ends.
 
 On a graph, each term of a residual depends on at most two bonds. So a statement is true for every graph if it is true
 for all graphs of one or two bonds. If all pairs of sites interact, a statement is true for every number of sites if it
@@ -258,7 +260,8 @@ def _box(cell: Cell) -> tuple[int, ...]:
 def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], domain_text: str = "") -> Statement:
     """Return a statement that ``examine`` decides on a box with open ends.
 
-    In one dimension it is decided on all smaller boxes as well. It is undecided if the box has too many coordinates.
+    In one dimension, ``examine`` decides it on all smaller boxes as well. If the box has too many coordinates, the
+    statement remains undecided.
     """
     sizes = _box(cell)
     count = len(cell.fields)

@@ -47,8 +47,9 @@ class _NoLatticeError(Exception):
 class _SiteNames:
     """The fields and sites that names stand for.
 
-    ``sites`` maps the names of coordinates, and of parameters that differ from site to site, to (field, site).
-    ``space`` has the symbols of neighbours on the lattice. ``point`` has the values at which terms are compared.
+    ``sites`` maps names to (field, site): the names of coordinates, and of parameters that differ from site to site.
+    ``space`` has the symbols of neighbours on the lattice. ``point`` has the values of symbols at which terms are
+    compared.
     """
 
     fields: tuple[str, ...]
@@ -255,11 +256,10 @@ def _key(e: Expression, names: _SiteNames) -> float:
 
 
 def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
-    """Return the terms of the density whose sum over all sites is the sum of ``terms``. Each of the ``terms`` comes
-    with its site.
+    """Return the terms of a density whose sum over all sites is the sum of ``terms``.
 
-    Each term must occur equally often at every site at which it fits between open ends; else `_NoLatticeError` is
-    raised.
+    Each of the ``terms`` comes with its site. It must occur equally often at every site at which it fits between open
+    ends; else `_NoLatticeError` is raised.
     """
     kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
     for base, term in terms:
@@ -419,6 +419,6 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     site_arrays = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRunSettings(names.sizes, state, (), site_arrays)
-    # In specs of lattices, sections and stops name observables; those of an ordinary spec do not carry over.
+    # Sections and stops of an ordinary spec are left out: in the spec of a lattice they would have to name observables.
     none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

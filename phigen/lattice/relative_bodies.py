@@ -1,17 +1,18 @@
-"""Attracting bodies of a lattice in relative coordinates: H is a sum of Kepler motions A and a small remainder B.
+"""Attracting bodies of a lattice in relative coordinates: H = A + B, Kepler motions and a small remainder.
 
 H = Σ m_i|v_i|²/2 − Σ γ m_i m_j/|q_i − q_j|, in terms of momenta m_i v_i or velocities v_i. In the coordinates of
-`phigen.splitting.relative` each body but the first has a position Q_i and a velocity V_i = w_i P_i, and the first
-coordinate is the centre of mass. Divided by m_i, all equations of motion have a limit at m_i = 0: a body without mass
-is attracted by others, but attracts none. The flows of the parts are:
+`phigen.splitting.relative`, the centre of mass takes the place of the first body. Each other body has a position Q_i
+and a velocity V_i, which is its relative momentum divided by its reduced mass. All equations of motion are divided by
+m_i, and then have a limit at m_i = 0: a body without mass is attracted by others, but attracts none. The parts have
+these flows:
 
 - A moves Q_i and V_i along a conic section with the strength γ M_i, and the centre of mass uniformly;
 - B changes V_i by the attraction of the other bodies.
 
 In Jacobi coordinates, M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all other bodies. The acceleration
-of Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B causes the difference of this acceleration and that of the
-Kepler motion, −γ M_i Q_i/|Q_i|³. In democratic heliocentric coordinates, M_i = m_0. Then B has the attraction by all
-bodies but the first, and moves all Q_i with the velocity Σ m_j V_j/m_0.
+of Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B causes the difference of this acceleration and −γ M_i
+Q_i/|Q_i|³, the acceleration in the Kepler motion. In democratic heliocentric coordinates, M_i = m_0. There B contains
+the attraction by all bodies but the first. It also moves all Q_i with the velocity Σ m_j V_j/m_0.
 """
 
 from __future__ import annotations
@@ -38,8 +39,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 #: The array of central masses M_i of the Kepler motions. The solver computes it from the masses of the bodies.
 INNER_MASS = Symbol("inner", "mass")
 
-#: Key of specs that selects relative coordinates, and the name of Jacobi coordinates, in which B depends on positions
-#: only.
+#: Key of specs that selects relative coordinates, and the value of this key for Jacobi coordinates.
 KEY, JACOBI = "coordinates_from", "jacobi"
 
 _FORM = (
@@ -88,7 +88,7 @@ class LatticeBodies:
 
     @property
     def pulls(self) -> BondSum:
-        """The acceleration of body a by body b along each axis, with the opposite sign, as a sum over pairs."""
+        """Minus the acceleration of a body by all others, along each axis, as a sum over the pairs of this body."""
         slopes = gradient(self.cell.pair_hamiltonian, [self.cell.at(q, ("a",)) for q, _ in self.axes])
         inertia = {self.cell.at(self.mass, ("a",)): 1}
         names = [Symbol(GATHERED, q) for q, _ in self.axes]
@@ -116,9 +116,10 @@ class LatticeBodies:
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:
-        """Return the flow of the part of H that remains without the Kepler motions.
+        """Return the flow of the remainder B = H − A, where A has the Kepler motions.
 
-        The attribute ``hamiltonian`` of the flow holds the terms that belong to a pair of bodies.
+        The attribute ``hamiltonian`` of the flow has the energy of a pair of bodies. In Jacobi coordinates, the energy
+        of attraction in the Kepler motion of a body is subtracted.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
@@ -158,13 +159,14 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
     """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    Sweeps with sums over pairs get the additional sums by which positions move in democratic heliocentric coordinates.
+    In democratic heliocentric coordinates, sweeps with sums over pairs also get the sums Σ m_j V_j/m_0, the velocity
+    that the flow of B adds to all positions.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 
 
 def of_massive(partners: Partners) -> Partners:
-    """Return the energies and forces of pairs as sums over the bodies with mass: those without mass contribute 0."""
+    """Return the energies and forces of pairs as sums over the bodies with mass. Bodies without mass contribute 0."""
 
     def massive(gather: Gather) -> Gather:
         return replace(gather, ends=tuple(replace(e, massive=True) for e in gather.ends))
@@ -238,7 +240,8 @@ def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
 
 
 def _axes(cell: Cell, positions: Sequence[str], mass: str) -> tuple[tuple[tuple[str, str], ...], bool]:
-    """Return the pairs (position, momentum or velocity) of all axes, and whether the second members are momenta.
+    """Return the pairs (position, momentum or velocity) of all axes. The second result is true for momenta, false for
+    velocities.
 
     Raises `_OtherFormError` if the brackets or the kinetic energy have another form.
     """

@@ -107,11 +107,11 @@ class _FewBodies:
         return [first, *([c + e for c, e in zip(first, of, strict=True)] for of in relative)]
 
     def product(self, positions: str, velocities: str) -> Expression:
-        """Return the sum Σ m q·v in Cartesian coordinates, minus the sum M R·V + Σ Q·V/w in relative
-        coordinates.
+        """Return the difference of two sums, which is 0 if the change of coordinates is canonical.
 
-        Q and V are relative positions and velocities. R and V without a sum are those of body 0, that is, of the centre
-        of mass. M is the total mass, and 1/w are reduced masses.
+        The first sum is Σ m_i q_i·v_i, in Cartesian coordinates. The second is M R·V + Σ Q_i·V_i/w_i, in relative
+        coordinates. Here R is the centre of mass, V its velocity, M the total mass, and 1/w_i are reduced masses.
+        ``positions`` and ``velocities`` are the kinds (see `names`) of the symbols for Q and V.
         """
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]
@@ -123,14 +123,12 @@ class _FewBodies:
         return total(m * a * b for m, q, v in pairs for a, b in zip(q, v, strict=True)) - total(relative)
 
     def canonical(self) -> Iterator[tuple[str, Expression]]:
-        """Yield a residual that is 0 if the change to relative coordinates is canonical.
-
-        It is Σ m q·v in Cartesian coordinates minus the same sum in relative coordinates; see `product`.
-        """
+        """Yield a residual that is 0 if the change to relative coordinates is canonical (see `product`)."""
         yield f"{self.count} bodies", self.product("Q", "V")
 
     def recoil(self) -> Expression:
-        """Return |Σ m_j V_j|²/2m_0, the kinetic energy that remains without Kepler motions; 0 in Jacobi coordinates.
+        """Return |Σ m_j V_j|²/2m_0, the kinetic energy that does not belong to Kepler motions; 0 in Jacobi
+        coordinates.
 
         m_j are masses, and V_j velocities in democratic heliocentric coordinates.
         """
@@ -152,7 +150,7 @@ class _FewBodies:
                 yield f"q_{i} - q_0", q[i][k] - q[0][k] - symbol(n)
 
     def remainder(self) -> Expression:
-        """Return the part of H that remains without the Kepler motions, as a function of the relative coordinates."""
+        """Return the remainder B = H − A, where A has the Kepler motions, as a function of the relative coordinates."""
         gravity, m, q = self.bodies.gravity, self.masses, self.cartesian("Q")
         pairs = [(i, j) for i, j in combinations(range(self.count), 2) if self.bodies.jacobi or i > 0]
         energies = (
@@ -166,9 +164,9 @@ class _FewBodies:
         return total([*energies, *kepler]) + self.recoil()
 
     def pull(self, a: int, b: int, k: int) -> Expression:
-        """Return the acceleration of body ``a`` by body ``b`` along axis ``k``, with the opposite sign.
+        """Return minus the acceleration of body ``a`` by body ``b`` along axis ``k``.
 
-        The remainder is the part of H without Kepler motions. Its kernel computes the acceleration by the same formula.
+        The formula is the one in the kernel for the remainder of H (see `remainder`).
         """
         q, cell = self.cartesian("Q"), self.bodies.cell
         value = [*self.bodies.pulls.values.values()][k]
@@ -178,7 +176,7 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the sums over bodies that the kernel of the remainder of H reads for body ``i``, by symbol."""
+        """Return the sums over other bodies that the flow of the remainder of H needs at body ``i``, by symbol."""
         axes, first = range(len(self.bodies.axes)), 0 if self.bodies.jacobi else 1
 
         def pulled(a: int, k: int) -> Expression:
@@ -194,10 +192,8 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield residuals that are 0 if the flow of the remainder of H has the right rates. A residual is the
-        difference of a rate and a component of the vector field of the remainder.
-
-        The remainder is the part of H without Kepler motions.
+        """Yield residuals that are 0 if ``flow`` has the rates of change of the vector field of the remainder B
+        of H.
         """
         (motion,), b = flow.motions, self.remainder()
         for i in self.others:

@@ -1,8 +1,8 @@
-"""Steps of a lattice by the first term S_h = hH of the Hamilton–Jacobi series. A stage is the implicit step of order 2
-that a bi-realisation gives; a step is a composition of stages.
+"""Steps of a lattice by the first term S_h = hH of the Hamilton–Jacobi series.
 
-A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). With the
-covectors h∇H written out, y and the increment of x are formulas in the values at a site and around it, for all H and π.
+A step is a composition of stages. A stage is the implicit step of order 2 that a bi-realisation (α, β) gives. It solves
+y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). Both right-hand sides
+are formulas in the values at a site and around it.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class SeriesPlan:
     """Plan of a step by the series: the bi-realisation, and the composition of stages of order 2.
 
     ``fractions`` are the durations of the stages in units of the step. A stage solves α(y, h∇H(y)) = x for y.
-    ``middle`` is y at a site, as a formula in x at the site (the symbols `initial`) and in y at the site and around it.
-    ``increment`` is the increment of x in the stage. ``middle`` and ``increment`` have an entry for each field, and the
-    symbol `TIME` for the duration of the stage.
+    ``middle`` has the formula for y at a site, by field. The formula contains x at the site (the symbols `initial`),
+    and y at the site and around it. ``increment`` has the increment of x in the stage, by field. The symbol `TIME` is
+    the duration of the stage.
     """
 
     realisation: CellRealisation
@@ -54,7 +54,7 @@ class SeriesPlan:
     increment: Mapping[str, Expression]
     since: str = field(default="", kw_only=True)  # the reason why the series is used for an H that splits
 
-    #: The scheme, as in specs. Since a stage solves an equation, a plan by the series has no parts of H with flows.
+    #: The name of the scheme in specs. A plan by the series has no flows: each stage solves an equation.
     scheme = "series"
     is_implicit, weak_order = True, 1
     flows: ClassVar[tuple[CellFlow, ...]] = ()
@@ -82,7 +82,7 @@ class SeriesPlan:
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """Whether each flow belongs to one colour of a graph: (), since a step by the series has no flows."""
+        """Always (): a step by the series has no flows that could belong to the colours of a graph."""
         return ()
 
     @property
@@ -186,10 +186,11 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return formulas by field, with expressions in place of the symbols of covectors p, for all sites.
+    """Return formulas by field in which the covectors p at all sites are replaced by expressions.
 
-    The expressions are p = h(∇H + ζ) + Σ ΔW σ∇g with the covector force ζ and the sources of noise. ``maps`` has
-    formulas in the symbols, such as those for the increment of x in a stage.
+    ``maps`` has the formulas in symbols for p, such as that for the increment of x in a stage. The expressions are p =
+    h(∇H + ζ) + Σ ΔW σ∇g, with the covector force ζ. The sum is over the sources of noise, with their increments ΔW,
+    amplitudes σ and Hamiltonians g.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
@@ -203,8 +204,8 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return the formulas for a stage by field, with the vector force f: the solution y of its equation, and the
-    increment of x.
+    """Return the formulas for a stage with a vector force f: those for y, and those for the increment of x, by
+    field.
 
     Half of the impulse hf acts before the stage, and half after it.
     """

@@ -1,11 +1,11 @@
 """Proofs that the series on a lattice is correct, repeated at each build.
 
-If brackets are between fields of one site only, the axioms of the bi-realisation are proved at one site, otherwise on a
-periodic box. The box is so large that the sites that α reads at two neighbouring sites do not wrap around it. So by
-translation the proof holds for every larger box.
+The axioms of the bi-realisation (α, β) are proved at one site if all brackets are between fields of one site. Otherwise
+they are proved on a periodic box. The box is large enough: the values that α reads at two neighbouring sites do not
+wrap around the box. By translation, the proof then holds for every larger box.
 
-Then two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p =
-h∇H the increment is hπ∇H up to O(h²). A stage is symmetric, so it has order 2.
+Two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p = h∇H
+the increment is hπ∇H up to O(h²). Since a stage is also symmetric, its order is 2.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """Yield two statements on a stage: the formula for y solves its equation α(y, p) = x, and the stage has order 2."""
+    """Yield two statements on a stage: the formula for y solves the equation α(y, p) = x, and the stage has order 2."""
     realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
     substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)
@@ -74,7 +74,9 @@ def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiReali
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """Return an expression relative to a site, in the symbols of the ``box``: fields and covectors of all its sites."""
+    """Return an expression of the cell, placed at a site of the ``box``: in the symbols of the fields and covectors of
+    all sites of the box.
+    """
     values: dict[str, Expression] = {}
     for name in symbols_of(e):
         covector = isinstance(name, Symbol) and name.kind == MOMENTUM

@@ -1,15 +1,15 @@
 """The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
 A part V of H is a sum over sites of terms whose coordinates commute over the whole lattice. Its gradient is constant
-along its flow. So each site has its own equation of motion ẋ = Σ {x, a} ∂V/∂a, in which the values at neighbours are
-constants. If π couples neighbours, or if a term mixes coordinates that do not commute, the sites are coloured, and the
-terms that begin at sites of one colour form a part. Terms that are functions of a single site also form parts if they
-have an elementary flow.
+along its flow. So each site has its own equation of motion ẋ = Σ_a {x, a} ∂V/∂a, where the sum is over all coordinates
+a, and values at neighbours are constants. If π couples neighbours, or if a term mixes coordinates that do not commute,
+the sites are coloured, and the terms that begin at sites of one colour form a part. Terms that are functions of a
+single site also form parts if they have an elementary flow.
 
 Some sizes are not multiples of the period of the colours, as for a ring with two colours and an odd number of sites.
-Then the colours are counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary
-*seam*, form additional parts. A seam is so wide that no term that begins elsewhere reaches across it. The position of a
-site near a seam decides which terms act on it. So each term has a weight of the kind `BEGINS` in the equation of
+Then the colours are counted from site 0 on, and the last sites along an axis are the boundary *seam*. Terms that begin
+on a seam form additional parts. A seam is so wide that no term that begins elsewhere reaches across it. The position of
+a site near a seam decides which terms act on it. So each term has a weight of the kind `BEGINS` in the equation of
 motion: 1 if the term belongs to the part, else 0.
 """
 
@@ -56,7 +56,7 @@ Coordinate = tuple[str, int]
 class Summand:
     """A term of H. It belongs to a site or, if ``bond`` is true, to a bond or a pair.
 
-    ``low`` and ``high`` are the smallest and the largest offset along each axis of the sites that the term reads.
+    The term reads sites at offsets from ``low`` to ``high`` along each axis.
     """
 
     expression: Expression
@@ -121,13 +121,13 @@ class Colouring:
 
 @dataclass(frozen=True)
 class BondSum:
-    """Sums over the bonds or pairs of a site: ``values`` maps a symbol for each sum to its summand in ``x[a]`` and
-    ``x[b]``.
+    """Sums over the bonds or pairs of a site.
 
-    x[a] is x at the site itself, and x[b] is x at its partner. ``end`` is the end of the bond at which the site lies: a
-    for the end that the user lists first, b for the second, "" for either. In a part of one colour, ``chosen`` says
-    which of the two sites has the colour: ``here`` the site itself, ``there`` its partner, "" neither. The symbols in
-    ``extremes`` stand for a maximum (``max``) or minimum (``min``) in place of a sum.
+    ``values`` maps the symbol of each sum to its summand. In the summand, x[a] is x at the site itself, and x[b] is x
+    at the opposite end of the bond or pair. If ``end`` is "a", the sums are over the bonds that list the site first; if
+    it is "b", over those that list it second; if it is "", over all. In a part of one colour, ``chosen`` says which end
+    of a bond has the colour: the site itself ("here") or the opposite end ("there"). The symbols in ``extremes`` stand
+    for a maximum (``max``) or minimum (``min``) in place of a sum.
     """
 
     values: Mapping[str, Expression]
@@ -140,10 +140,11 @@ class BondSum:
 class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
-    ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or pairs.
-    These sums are ``gathered``, and symbols `GATHERED` stand for them. ``solution`` has the increments with a symbol
-    `FORCE` for each component of the gradient of the part; it solves ẋ = ``rates``. For damping, whose force is not the
-    gradient of a part, ``components`` has the values of these symbols. ``manner`` describes the motion in words.
+    The ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or
+    pairs. ``gathered`` lists the sums; symbols `GATHERED` stand for them. ``solution`` has the same increments, with a
+    symbol `FORCE` in place of each component of the gradient of the part. It solves ẋ = ``rates``. For damping,
+    ``components`` has the values of the symbols `FORCE`, since the force is not the gradient of a part. ``manner``
+    describes the motion in words.
     """
 
     colour: int | None
@@ -158,9 +159,9 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    A term of H reads sites up to ``reach`` apart. Its flow updates sites up to ``separation`` away from the site where
-    the term begins. The equations of motion read no sites farther away, unless a bracket {f, g} depends on other sites
-    than those of f and g.
+    The flow of a term of H updates sites up to ``separation`` away from the site where the term begins. If each bracket
+    {f, g} depends only on the sites of f and g, the equations of motion read no sites farther away. Otherwise a seam
+    must be wider.
     """
     if period == 1:
         return Seam()
@@ -191,10 +192,11 @@ class CellFlow(Flow):
     """The flow of a part of H over the lattice. The order of the ``motions`` has no effect, nor has the order of the
     sites.
 
-    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On graphs, the terms of
-    a flow marked ``by_colour`` belong to one colour; a step applies this flow for each colour in turn. If the colouring
-    has boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set of seams, as a bit mask
-    over the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these seams.
+    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On a graph,
+    ``by_colour`` is true if the part has only the terms of one colour; a step then applies the flow once for each
+    colour. If the colouring has boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set
+    of seams, as a bit mask over the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these
+    seams.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -211,7 +213,7 @@ class CellFlow(Flow):
 
 @dataclass(frozen=True)
 class CellSplitting:
-    """The flows of the parts of H, and the colouring of the sites that they use."""
+    """The flows of the parts of H, and the ``colouring`` of sites on which the parts are based."""
 
     flows: tuple[CellFlow, ...]
     colouring: Colouring
@@ -326,8 +328,8 @@ class PartSearch:
         return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether {a, b} can differ from 0 for the field ``a`` at one site and the field ``b`` at another one, each at
-        a site of its own colour.
+        """Whether a field at a site can have a nonzero bracket with a field at another site. The arguments ``a`` and
+        ``b`` have the two fields and the colours of their sites.
         """
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
@@ -509,8 +511,8 @@ class PartSearch:
         return any((g, self.colouring.at(colour, d)) in coordinates for g, d in self._couples.get(field, ()))
 
     def _site_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
-        """Return the flows of the sum of ``terms``, which are functions of one site: one flow, or several if that is
-        needed.
+        """Return the flow of the sum of ``terms``, which are functions of one site, or several flows if this one is not
+        elementary.
         """
         if not terms:
             return []

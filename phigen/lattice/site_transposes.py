@@ -5,7 +5,8 @@ takes the cotangents of the increments. For each value that the kernel of the sw
 the cotangent of this value. Targets add the contribution at the site of the value.
 
 In the series a stage is y = r(x, y), x' = x + a(y). Let λ be the cotangent of x'. Then μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ is
-solved for μ, and x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the transposed kernels of r and a.
+solved for μ, and x̄ = λ + (∂r/∂x)ᵀμ is the cotangent of x. The products with transposed derivatives are computed by the
+transposed kernels of r and a.
 """
 
 from __future__ import annotations

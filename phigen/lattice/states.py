@@ -28,7 +28,7 @@ class Start:
 
     ``sizes`` are the numbers of sites along the axes of a grid; for graphs and pairs, the only size is the number of
     sites. ``state`` has the shape (fields, *sizes). ``parameters`` maps names to a number, or to an array over sites or
-    bonds. ``bonds`` has the shape (bonds, 2) and contains sites; ``graph`` is true if the lattice is a graph.
+    bonds. Each row of ``bonds`` has the two sites that a bond connects. ``graph`` is true if the lattice is a graph.
     """
 
     sizes: tuple[int, ...]
@@ -39,7 +39,7 @@ class Start:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The parameters as a solver receives them: by name, and the bonds of a graph as ``bonds``."""
+        """The arguments of a solver by name: the parameters and, for a graph, ``bonds``."""
         return {**self.parameters, **({"bonds": self.bonds} if self.graph else {})}
 
 
@@ -54,9 +54,8 @@ def start_of(spec: Spec, run: Run) -> Start:
 def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bonds: int) -> dict[str, Floats]:
     """Return arrays with the default values of the parameters ``names`` at all sites or bonds of a lattice.
 
-    Parameters with one number as the default are left out; the defaults of all others are formulas, lists, files or
-    random. ``bonds`` is the number of bonds of a graph. Raises `SpecError` at a parameter whose array has another
-    length.
+    A parameter is left out if its default is one number for all sites or bonds. ``bonds`` is the number of bonds of a
+    graph. Raises `SpecError` if the default is an array of the wrong length.
     """
     arrays = {}
     for p in spec.parameters:
@@ -115,7 +114,7 @@ class _Reader:
         entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
         if (least := np.min(values)) < 0:
             raise self._out_of_bound(p, values, f"{begin} masses must be nonnegative")
-        if least == 0 and p.name not in symbols_of(*entries):  # brackets without masses are those of momenta
+        if least == 0 and p.name not in symbols_of(*entries):  # if m is not in π, the fields are momenta
             raise self._out_of_bound(p, values, f"{begin} bodies with momenta must have positive masses")
 
     def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:
@@ -128,7 +127,7 @@ class _Reader:
         return self.arrays.refused(p.name, f"{rule}, but {where}")
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
-        """Raise `SpecError` if all arrays over the sites together do not fit into memory."""
+        """Raise `SpecError` if the memory is too small for the arrays over all sites."""
         arrays = len(self.lattice.indices) + len(self.spec.coordinates)
         arrays += sum(p.at == "sites" for p in self.spec.parameters)
         place = self.spec.diagnostic(("runs", self.run.name, "sizes"), "").location
@@ -140,8 +139,8 @@ class _Reader:
     def _sites(self, bonds: Bonds) -> int:
         """Return the number of sites of a run that does not state ``sizes``.
 
-        It is the largest length of a list in the initial state. If bonds end at sites with larger numbers, it is the
-        largest of these numbers plus 1, since sites are counted from 0.
+        It is the length of the longest list in the initial state. If a bond ends at a site beyond this length, the
+        number is that of the last such site, plus 1, since sites are counted from 0.
         """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):
@@ -174,7 +173,7 @@ class _Reader:
 class _Arrays:
     """Reader of values of a spec as arrays over the sites or bonds of a lattice with the given ``sizes``.
 
-    ``run`` is the name of the run whose values are read; ``hint`` is the hint of the errors.
+    ``run`` is the name of the run whose values are read. Error messages end with ``hint``.
     """
 
     def __init__(self, spec: Spec, sizes: Sequence[int], run: str = "", hint: str = "") -> None:

@@ -142,7 +142,9 @@ class SplittingPlan:
         return ""
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
-        """Yield all flows, the flows of noise first, each with the name of its generator."""
+        """Yield all flows, each with a text that says what moves: a source of noise, a force, or a part of H. Noise
+        comes first.
+        """
         for flow, name in zip(self.noise, cell.noise, strict=True):
             yield flow, f"the noise {name}"
         for k, flow in enumerate(self.flows, 1):
@@ -228,8 +230,8 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
     """Return the method with additional flows for the terms that begin on boundary seams, where colours break their
     period.
 
-    For each part of H but the last, the flows on seams come after the flow of its remaining terms. For the last part,
-    they come before this flow.
+    The flows on seams follow directly after the flow of the same part of H on all other sites. For the last part the
+    order is reversed, so that its flow on all other sites comes last.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -241,7 +243,8 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield flows of those terms of a part of H that begin on boundary seams, where colours break their period.
+    """Yield the flows of the terms of a part of H that begin on boundary seams, where colours break their
+    period.
 
     There is one flow for each set of seams on which a site may lie.
     """
@@ -307,10 +310,10 @@ def _seamed(
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
-    """Return the parts of H that can be the potential V of a Nyström method.
+    """Return the parts V of H = T + V that can be the potential of a Nyström method.
 
-    If H depends on the time, T + e takes the place of T, where e is the momentum of the time. Then T must not depend on
-    the time, since V must commute with ∂V/∂t.
+    If H depends on the time, T + e takes the place of T, where e is the momentum of the time. Then a part V is left out
+    if T depends on the time.
     """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
@@ -476,8 +479,8 @@ def _gather(
 ) -> Gather | None:
     """Return the kernels that compute sums over bonds or pairs, or None if ``sums`` is empty.
 
-    All members of ``sums`` have the same symbols. For instance, one member is for the ends a of bonds, and one for the
-    ends b.
+    All elements of ``sums`` have the same symbols. For instance, one element is for the bonds at whose end a a site
+    lies, and one for the bonds at whose end b it lies.
     """
     if not sums:
         return None

@@ -1,6 +1,6 @@
-"""Derivatives of kernels at a site with respect to the fields around it, along variations of the fields.
+"""Directional derivatives of kernels at a site, along variations of the fields at and around the site.
 
-Newton's method and tangent maps need them.
+Newton's method and tangent maps need these derivatives.
 """
 
 from __future__ import annotations
