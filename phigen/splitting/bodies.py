@@ -62,8 +62,10 @@ def split_bodies(system: System, change: str) -> SplitHamiltonian:
 
 @dataclass(frozen=True)
 class _Distance:
-    """A variable of the ring that stands for 1/|q_a − q_b|; ``pairs`` has, for each axis, the indices of two
-    coordinates."""
+    """A variable of the ring that stands for 1/|q_a − q_b|.
+
+    ``variable`` is its index. ``pairs`` has the indices of the coordinates of q_a and q_b, as one pair for each axis.
+    """
 
     variable: int
     pairs: tuple[tuple[int, int], ...]
@@ -118,7 +120,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
 
 
 def _distance(ring: Ring, generator: Generator) -> _Distance | None:
-    """Return the two bodies whose inverse distance is a variable (``generator``) of the ring.
+    """Return the distance of two bodies whose inverse is a variable of the ring, given by its ``generator``.
 
     Returns None if the argument of the root is not a sum of squares of differences of two coordinates.
     """

@@ -24,10 +24,10 @@ Row = dict[Monomial, Poly]
 
 @dataclass(frozen=True)
 class LinearMotion:
-    """Linear equations ẇ = Aw for monomials w, of which the first ones are single coordinates.
+    """Linear equations ẇ = Aw for monomials w. The first monomials are single coordinates.
 
-    ``basis`` has the exponents of the monomials, and ``coordinates`` the indices of the single coordinates. The entries
-    of A, the ``matrix``, are constant along the flow. If the equations contain the monomial 1, it is the last one.
+    ``basis`` has the exponents of all monomials, and ``coordinates`` the indices of the single coordinates. ``matrix``
+    is A; its entries are constant along the flow. If the monomial 1 occurs, it is the last one.
     """
 
     coordinates: tuple[int, ...]

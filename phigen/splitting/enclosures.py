@@ -1,5 +1,6 @@
-"""Check that matrix exponentials in floating-point arithmetic lie within rounding of rigorous enclosures by ball
-arithmetic."""
+"""Check of matrix exponentials in floating-point arithmetic: their errors must be those of rounding. Ball arithmetic
+gives rigorous bounds.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 #: Times t at which exp(tA) − 1 is checked, as multiples of 1/‖A‖.
 TIMES = (1e-3, 1.0, 30.0)
 
-#: Largest accepted error of exp(tA) − 1. The error is relative to the norm of exp(tA) − 1, is measured in units of the
-#: machine precision, and is divided by the sum of ‖tA‖ and the number of rows.
+#: Largest accepted error of exp(tA) − 1, divided by three factors: the norm of exp(tA) − 1, the machine precision, and
+#: the sum of ‖tA‖ and the number of rows.
 UNITS = 8.0
 
 #: Precision of the ball arithmetic in bits.

@@ -52,8 +52,9 @@ class EulerMotion:
         return f"{', '.join(self.coordinates)} moved as a free rigid body, by elliptic functions"
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions unchanged, as proofs about this motion need no auxiliary symbols, unlike those about
-        `RelativeMotions`."""
+        """Return the expressions unchanged. `RelativeMotions` has a method of this name that inserts symbols for
+        proofs; here none are needed.
+        """
         return [*roots]
 
     def field(self, names: Sequence[str]) -> list[Expression]:
@@ -119,7 +120,8 @@ class Addition:
         gaps_below, gaps_above = [e - low for e in self.levels], [high - e for e in self.levels]
         square, z = s**2, self.p * self.kappa**2
         roots = [sqrt(c**2 + e * square) for e in gaps_below]
-        # On the separatrix (R = 0) C > 0 and C equals a root, but rounding may make C negative.
+        # On the separatrix, that is for R = 0, C is positive and equal to one of the roots. Rounding may make C
+        # negative, so the root is used.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
         versine = 8 * z * power(1 + z, -2)  # 1 − C without cancellation
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
@@ -155,10 +157,10 @@ def levels_of(x: Vector, factors: Vector) -> list[Expression]:
 
 
 def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return three expressions whose signs give the order of the E_i, from ``levels``.
+    """Return three expressions whose signs give the order of the E_i; ``levels`` has E_1, E_2, E_3.
 
-    They are positive in these cases. First: E_2 > E_1. Second: E_3 is above the lower one of E_1 and E_2. Third: the
-    upper one of E_1 and E_2 is above the larger one of the remaining two.
+    The first is positive if E_2 > E_1. The second is positive if E_3 is greater than the smaller of E_1 and E_2. The
+    third is positive if the greater of E_1 and E_2 is greater than both other values.
     """
     second = levels[1] - levels[0]
     lower, upper = call("choose", second, *levels[:2]), call("choose", second, levels[1], levels[0])

@@ -29,7 +29,7 @@ Matrix = Sequence[Sequence[Poly]]
 #: minutes.
 MOST_POWERS = 16
 
-#: Word for reports: a motion at a constant rate.
+#: Description of a motion at a constant rate, for reports.
 SHIFTED = "shifted"
 
 _HALF = number(Fraction(1, 2))
@@ -159,8 +159,8 @@ def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequ
     """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A³ = −cA, by entire functions of ``s``
     = ct².
 
-    A is written as fM with a factor f that does not depend on the state, and f multiplies the time. M²w is computed as
-    M times Mw where that needs fewer operations than the entries of M², as for cross products.
+    A is written as fM with a factor f that does not depend on the state, and f multiplies the time. M²w is computed in
+    the cheaper of two ways: from the entries of M², or as M times Mw, which is cheaper for cross products.
     """
     factor = _static_factor(ring, matrix)
     once = [ring.expression(v / factor) for v in images[0]]
@@ -231,8 +231,8 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
 def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
     """Return d with a = d·b for two matrices a and b, or None if the ring contains no such d.
 
-    If polynomial division finds no d, because reciprocals in the entries have been cancelled, the diagonal entries of
-    ``guess`` are tried.
+    d is found by polynomial division. This fails if reciprocals in the entries have been cancelled. Therefore the
+    diagonal entries of ``guess`` are tried too.
     """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):

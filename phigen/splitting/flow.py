@@ -36,7 +36,7 @@ Motion = KeplerMotion | RelativeMotions | EulerMotion
 #: at most four rows.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
-#: Words for reports: a linear motion by a matrix exponential that is computed before the steps.
+#: Description of a linear motion by a matrix exponential that is computed before the steps, for reports.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 
@@ -171,9 +171,9 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, metho
     """Return the flow of a sum of terms, from its equations of motion as a whole, or the reason why there is
     none.
 
-    ``linear`` admits only linear equations, since their solutions have full relative precision even for small
-    coordinates. By other methods a coordinate may be the difference of a constant sum and other coordinates, which has
-    lower relative precision. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
+    If ``linear``, only linear equations are solved. Their solutions have full relative precision even for small
+    coordinates. Other solutions may compute a coordinate as the difference of a constant sum and other coordinates,
+    with a lower relative precision. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))

@@ -6,10 +6,10 @@ separate parts. If phigen does not know the flow of πζ, its summands πζ_i dx
 if it does not know the flow of f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i
 times a factor. It is tangent to the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping is ζ = λπb with b = ∇H. If its flow is not known, b is divided into summands for each block of π. One summand
-has the terms of b that do not depend on the coordinates of the block. The remaining terms are one more summand or, if
-that has no flow, one summand for each component of b. Two flows become one part if neither changes a coordinate that
-the other reads.
+Damping is ζ = λπb with b = ∇H. If its flow is not known, each block of π has flows of its own, from the components of b
+in the block. If these components together have no flow, they are divided into two summands: the terms that do not
+depend on the coordinates of the block, and all other terms. If the other terms have no flow either, each component has
+its own summand. Finally, flows are combined into one part if none of them changes a coordinate that another one reads.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def force_flows(system: System) -> tuple[Flow, ...]:
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
-    """Return the flows of the forces in closed form: of the whole field or, if it has none, of πζ and f or their
-    summands.
+    """Return the flows of the forces in closed form: one flow of the whole field πζ + f or, if there is none, flows of
+    πζ, f or their summands.
     """
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     common_flow = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
@@ -159,7 +159,7 @@ def _damped(system: System, damping: Expression, b: Sequence[Expression]) -> Flo
 
 
 def _covectors(system: System, covector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
-    """Yield for each component of a covector ζ its name and its field πζ_i dx_i."""
+    """Yield (name, field πζ_i dx_i) for each component ζ_i of a covector."""
     for i, (c, zeta) in enumerate(zip(system.coordinates, covector, strict=True)):
         if not zeta.is_zero:
             alone = [zeta if k == i else ZERO for k in range(system.dimension)]

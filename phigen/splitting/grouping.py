@@ -37,7 +37,8 @@ def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
 
 
 def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, with sums in place of terms whose vector fields have monomials that cancel each other.
+    """Sum terms whose vector fields have monomials that cancel each other, and return the resulting list of
+    terms.
 
     Returns None if there are no such terms, or if no sum has a flow.
     """
@@ -60,8 +61,8 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """Return a list with one element, the sum of several terms. Returns None if there is only one term, or if the sum
-    has no flow.
+    """Return a list that contains only the sum of the terms ``group``; None if this is one term, or if the sum has no
+    flow.
     """
     if len(group) == 1:
         return None
@@ -80,7 +81,7 @@ def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
 
 
 def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, with a sum in place of all linear terms.
+    """Sum all linear terms, and return the resulting list of terms.
 
     A linear term is a coordinate of a Lie algebra times factors that are constant along its flow (`_is_linear`).
     Returns None if all linear terms commute with each other, or if their sum has no flow.

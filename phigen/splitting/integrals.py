@@ -1,4 +1,4 @@
-"""Linear first integrals of the flow of a part, and its equations after these integrals are substituted as constants.
+"""Linear first integrals of a flow, and the equations of motion in which these integrals are constants.
 
 For example, the sum S = s_1 + s_2 of two spins is constant along the flow of s_1·s_2. With S as a constant, ṡ_1 = s_1 ×
 s_2 becomes the linear equation ṡ_1 = s_1 × S.
@@ -36,7 +36,7 @@ class Reduced:
 def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
     """Return the equations of a vector field after elimination of coordinates by linear first integrals.
 
-    The integrals have rational coefficients. Returns None if there are none.
+    The integrals have rational coefficients. Returns None if there are no such integrals.
     """
     moving = [i for i, f in enumerate(field) if f != 0]
     relations = kernel(Field(), _equations(field, moving), len(moving))
@@ -44,7 +44,8 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    for relation in relations:  # the last coordinate has the factor 1, and is in no other relation
+    # The last coordinate of a relation has the factor 1 there, and occurs in no other relation.
+    for relation in relations:
         pivot = moving[max(relation)]
         other_terms = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot

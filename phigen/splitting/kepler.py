@@ -59,8 +59,9 @@ class KeplerMotion:
         return power(sqrt(square(self.position)), -3)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions unchanged, as proofs about a single Kepler motion need no auxiliary symbols, unlike
-        `RelativeMotions`."""
+        """Return the expressions unchanged. `RelativeMotions` has a method of this name that inserts symbols for
+        proofs; here none are needed.
+        """
         return [*roots]
 
     def changes(self) -> tuple[list[Expression], list[Expression]]:
@@ -96,9 +97,9 @@ class KeplerMotion:
 
 @dataclass(frozen=True)
 class _Orbit:
-    """The orbit of a Kepler motion through a state, with the constants of the formulas: r0, η, β and μ.
+    """The orbit of a Kepler motion through a state.
 
-    They are called ``distance``, ``moment``, ``beta`` and ``mu``.
+    The constants r0, η, β and μ of the formulas are ``distance``, ``moment``, ``beta`` and ``mu``.
     """
 
     position: Vector
@@ -147,10 +148,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols C, S, r0, η, β, w, k and one component of q
     and p.
 
-    All expressions vanish if the increments are the flow. Along the motion ds = dt/r, hence dS/dt = C/(2r) and dC/dt =
-    −βS/(2r), while the initial state is constant. The expressions are the residuals of the equations of motion, with r
-    in place of |q'|, and of r² = |q'|², with |v|² = 2wk/r0 − β. The relation C² + βS² = 1 is substituted as β = (1 −
-    C²)/S².
+    All expressions vanish if the increments are the flow. They are residuals of three equations: the equations of
+    motion of q and p, in which r stands for |q'|, and r² = |q'|². Time derivatives follow from ds = dt/r: dS/dt =
+    C/(2r) and dC/dt = −βS/(2r). The square |v|² is written as 2wk/r0 − β. The relation C² + βS² = 1 is substituted as β
+    = (1 − C²)/S².
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)

@@ -1,13 +1,12 @@
 """Kick parts: parts V of H = T + V with {V, {V, {V, T}}} = 0, for methods of Runge–Kutta–Nyström type.
 
-The condition holds if T resembles a kinetic energy, quadratic in the coordinates that the flow of V changes. Such pairs
+The condition holds if T is like a kinetic energy: quadratic in the coordinates that the flow of V changes. Such pairs
 exist for every Poisson structure: p²/2 with a potential V(q), or on se(3)* a quadratic form of the angular momenta with
-a function of the direction of gravity. In the Lie algebra that T and V generate, many brackets with several V then
-vanish, so a method has fewer order conditions. Since V commutes with {V, {V, T}}, V + κ{V, {V, T}} may also have an
-elementary flow: a kick with modified potential.
+a function of the direction of gravity. By the condition, many repeated brackets of T and V vanish, so a method has
+fewer order conditions. V also commutes with {V, {V, T}}. So V + κ{V, {V, T}} may have an elementary flow as well: a
+kick with modified potential.
 
-The bracket is {f, g} = ∇f·π∇g. The opposite sign leads to the same formulas, since the number of brackets in every
-formula is even.
+The bracket is {f, g} = ∇f·π∇g. With the opposite sign, {V, {V, T}} is the same, since it contains two brackets.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ from phigen.splitting.terms import hamiltonian_terms
 from phigen.symbolic.expression import gradient, symbol, symbols_of
 from phigen.symbolic.tower import Poly
 
-#: Largest number of monomials of {V, {V, T}} for which phigen tests by brackets whether V commutes with {V, {V, T}},
-#: and for which it makes a modified kick. The second number is for expressions with roots, for which tests for zero
+#: Largest number of monomials of {V, {V, T}}. With more monomials, phigen does not test by brackets whether V commutes
+#: with {V, {V, T}}, and makes no modified kick. The second number is for expressions with roots: there, tests for zero
 #: take much longer.
 MOST_MONOMIALS, MOST_WITH_ROOTS = 200, 40
 
 
 @dataclass(frozen=True)
 class Kick:
-    """A part of H = T + V that can be V, by its index ``part``.
+    """A part of H that can be V in H = T + V; ``part`` is its index.
 
     ``modified`` is the flow of V + κ{V, {V, T}}, where κ is the symbol `KICK`; None if there is no such flow.
     """
@@ -76,12 +75,12 @@ def modified_kick(system: System, kick: Flow, other: Flow) -> Flow | None:
 
 
 def _graded(ring: Ring, v: Poly, t: Poly) -> bool:
-    """Whether {V, {V, {V, T}}} = 0 follows from degrees, as for kinetic energies; this is faster than computing the
+    """Whether {V, {V, {V, T}}} = 0 follows from degrees, as for kinetic energies. This test is faster than computing
     brackets.
 
-    Let V be a function of commuting coordinates Q, let the brackets of Q with all other coordinates P be functions of
-    Q, and let brackets within P be at most linear in P. Then a bracket lowers the degree in P by one. V has degree 0,
-    so the condition holds if T has degree at most 2.
+    Let V be a function of commuting coordinates Q, and let P be all other coordinates. The condition follows from three
+    statements: brackets of Q and P are functions of Q, brackets within P are at most linear in P, and T has at most
+    degree 2 in P. Then each bracket with V lowers the degree in P by one, so the third bracket is 0.
     """
     potential_coordinates = set(ring.support(v))
     everything = range(len(ring.coordinates))
@@ -126,7 +125,7 @@ def _bracket(ring: Ring, f: Poly, g: Poly) -> Poly:
 
 
 def _modified(ring: Ring, plain: Flow, v: Poly, gradient: Poly) -> Flow | None:
-    """Return the flow of V + κ{V, {V, T}} for H = T + V; None if there is none or if {V, {V, T}} = 0.
+    """Return the flow of V + κ{V, {V, T}} for H = T + V; None if it is not elementary, or if {V, {V, T}} = 0.
 
     ``plain`` is the flow of V, and ``gradient`` is {V, {V, T}}.
     """

@@ -24,8 +24,9 @@ from phigen.symbolic.tower import Generator, Poly
 #: Dimensions of space in which Kepler motions are recognised.
 _DIMENSIONS = (2, 3)
 
-#: Largest ratio of the coefficients of the perturbations to those of the motions for which methods for near-integrable
-#: systems are used. Below it, their errors ε² h^6 and ε³ h^4 are smaller than those of general methods of order 4.
+#: Largest ratio ε of the coefficients of the perturbations to those of the motions for which methods for
+#: near-integrable systems are used. Below it, their errors ε² h^6 and ε³ h^4 for steps of size h are smaller than those
+#: of general methods of order 4.
 SMALL = 0.02
 
 

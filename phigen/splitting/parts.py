@@ -29,9 +29,9 @@ MAX_COMPANIONS = 3
 class SplitHamiltonian:
     """H as a sum of parts: the flows of the parts, in the order in which a step applies them.
 
-    ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); the
-    Hamiltonian of its flow may then contain κ{V, {V, T}}. ``small`` is the index of the part εB of a near-integrable H
-    = A + εB.
+    ``kick`` is set if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`): it is the index of the part
+    V. The Hamiltonian of this flow may contain κ{V, {V, T}}. ``small`` is set for a near-integrable H = A + εB: it is
+    the index of the part εB.
     """
 
     flows: tuple[Flow, ...]
@@ -44,12 +44,12 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
 
     The number of parts is as small as possible; among divisions with the same number, those whose parts preserve the
     most invariants are preferred. If ``motions``, a Kepler motion is a single term; if also ``rigid``, so is a free
-    rigid body. A near-integrable H is divided into its large and its small part. Raises `SpecError`, located at the
-    Hamiltonian, with a term that has no flow.
+    rigid body. A near-integrable H is divided into its large and its small part. Raises `SpecError` at the Hamiltonian
+    if a term has no flow; the message names the term.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
-    # A constant H becomes one term, so that there is a part, whose flow changes nothing.
+    # A constant H becomes one term, so that there is at least one part. The flow of this part changes nothing.
     terms = terms_of(ring, summands) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
@@ -176,8 +176,8 @@ def _without_companions(system: System, conflicts: Conflicts, terms: list[Term])
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return the flows after merging parts: two parts become one if the equations of their sum are linear with a closed
-    form.
+    """Return the flows after merging parts: two parts become one if the equations of motion of their sum are linear,
+    with a solution in closed form.
     """
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:

@@ -1,9 +1,10 @@
 """Other forms of H as a sum of terms, which may need fewer parts.
 
-*Companions* are functions C that do not affect the other terms. One example is a Casimir, whose flow changes nothing.
-Another example is |m|² on se(3)*, where m is the angular momentum: |m|² commutes with every function of m. In H = λC +
-(H − λC), a suitable λ cancels a term that does not commute with others. For example, the free rigid body then has two
-parts instead of three. C is a Casimir of π, or of the brackets of some coordinates that are closed under brackets.
+*Companions* are functions C whose multiples may be subtracted from some terms and added as a separate term: H = λC + (H
+− λC). A suitable λ cancels a term that does not commute with others. For example, the free rigid body then has two
+parts instead of three. C is a Casimir of π, whose flow changes nothing, or a Casimir of the brackets of some
+coordinates that are closed under brackets. An example on se(3)* is |m|² with the angular momentum m: it commutes with
+every function of m.
 
 *Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """
@@ -23,8 +24,7 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates of a sub-bracket (`_companions`) up to which Casimirs of the sub-bracket are searched
-#: for.
+#: Largest number of coordinates of a sub-bracket (see `_companions`) of which phigen computes Casimirs.
 MOST_COORDINATES = 8
 
 
@@ -60,7 +60,7 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
     """Yield functions C whose multiples may be subtracted from terms: Casimirs of π, and quadratic Casimirs of
     sub-brackets.
 
-    Two terms that do not commute have a sub-bracket. It is the bracket of certain coordinates: the smallest set that
+    Each two terms that do not commute define a sub-bracket: the brackets within the smallest set of coordinates that
     contains the coordinates of both terms and is closed under brackets.
     """
     ring, candidates = conflicts.ring, list(system.casimirs.values())
@@ -95,7 +95,7 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, with a sum in place of all terms that depend on the same two or more blocks of π.
+    """Sum all terms that couple the same blocks of π, two or more, and return the resulting list of terms.
 
     Returns None if there are no such terms.
     """

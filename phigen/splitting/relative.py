@@ -89,21 +89,17 @@ class RelativeMotions:
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates ``names`` in the motion of A, the sum of Kepler motions and the motion of
-        the centre of mass."""
+        """Return the time derivatives of the coordinates ``names`` along the flow of A."""
         return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates ``names`` in the flow of A over the time `TIME`.
-
-        A is the sum of the Kepler motions and of the motion of the centre of mass.
-        """
+        """Return the increments of the coordinates ``names`` in the flow of A over the time `TIME`."""
         shift = [symbol(TIME) * e for e in self.drift]
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions for a proof: with symbols in place of each |Q_i|⁻³ and M_i, and M_i − M_{i−1} in place
-        of m_i.
+        """Return the expressions in a form for proofs: symbols stand for each |Q_i|⁻³ and M_i, and m_i is written as
+        M_i − M_{i−1}.
 
         If an expression vanishes in this form, it vanishes for all masses and positions.
         """
@@ -115,9 +111,9 @@ class RelativeMotions:
         """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
         motion.
 
-        ``spread`` has the changes of the Cartesian coordinates for given changes of the Q_i and P_i. The first
-        expressions vanish if the forms Q_i and P_i of these Cartesian changes are the given changes. The others are the
-        identities of Kepler motions.
+        The first expressions vanish if ``spread`` is the inverse of the linear forms Q_i and P_i: it turns changes of
+        Q_i and P_i into changes of Cartesian coordinates, and the forms must turn these back. The other expressions are
+        the identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
@@ -177,8 +173,8 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield pairs of a mass and its replacement in proofs: a symbol for each sum M_i, and a difference of two symbols
-    for each m_i.
+    """Yield (mass, expression that replaces it in proofs). A sum M_i becomes a symbol; a mass m_i becomes the
+    difference of two such symbols.
 
     Masses that are numbers are left as they are.
     """
@@ -275,7 +271,7 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: The functions that divide H by relative coordinates, by the names of these coordinates in specs.
+#: The functions that return the division H = A + B, by the name that specs have for the relative coordinates.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

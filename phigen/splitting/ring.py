@@ -32,9 +32,10 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Ring:
-    """A polynomial ring that contains the functions of a system and their derivatives, with the Poisson bracket.
+    """A polynomial ring that contains the functions of a system and their derivatives, with the Poisson
+    bracket.
 
-    ``poisson`` is π as polynomials of the ``tower``, which is the ring with its derivatives; ``brackets`` is π as
+    ``tower`` is the ring itself. ``poisson`` has the entries of π as polynomials of the ring, ``brackets`` has them as
     expressions.
     """
 
@@ -92,8 +93,10 @@ class Ring:
         return [self.lowest(self.tower.combine(sums[j])) if j in sums else zero for j in range(len(self.poisson))]
 
     def lowest(self, element: Poly) -> Poly:
-        """Return the element with products q·(1/q) replaced by 1, wherever a polynomial q divides the factor of its
-        reciprocal 1/q."""
+        """Return the element after products q·(1/q) have been replaced by 1.
+
+        This is done in each term that contains the variable 1/q, if q divides the coefficient of this variable.
+        """
         for g in self.tower.generators:
             if g.kind != "reciprocal" or element == 0:
                 continue
@@ -114,8 +117,10 @@ class Ring:
         return element
 
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
-        """Return the derivative of an element along a vector field; if it vanishes by a relation of the ring, it is
-        literally 0."""
+        """Return the derivative of an element along a vector field.
+
+        The result is literally 0 if the derivative vanishes by a relation between variables, such as sin² + cos² = 1.
+        """
         derivative = self.tower.combine(
             field[j] * self.tower.derivative(element, self.coordinates[j])
             for j in self.support(element)
@@ -168,7 +173,7 @@ class Ring:
 def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
     """Return the ring of a system with H, π and the functions in ``further``.
 
-    It also has the time, and ``symbols`` as additional static variables.
+    The time and the ``symbols`` are additional static variables.
     """
     further_expressions = list(further)
     roots = [system.hamiltonian, *further_expressions, *(e for row in system.poisson for e in row)]

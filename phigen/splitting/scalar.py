@@ -22,9 +22,10 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
-    """Return the increment of coordinate number i along ż = ``rate``; None if the equation has no known closed form.
+    """Return the increment of coordinate number ``i`` along ż = ``rate``, or None if no closed form is known.
 
-    The rate may depend on no variables that change along the flow, except the coordinate and functions of it.
+    The rate may contain the coordinate and functions of it; all other variables in the rate must be constant along the
+    flow.
     """
     name = ring.coordinates[i]
     other_names = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]

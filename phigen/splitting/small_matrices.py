@@ -22,7 +22,7 @@ from phigen.symbolic.tower import Poly
 #: Largest number of rows of A.
 MOST_ROWS = 4
 
-#: Words for reports that describe the motion.
+#: Description of the motion, for reports.
 BY_CAYLEY_HAMILTON = "moved by exp(tA), by the theorem of Cayley and Hamilton"
 
 Matrix = Sequence[Sequence[Poly]]
@@ -52,8 +52,10 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
 
 
 def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return the increments for a matrix A with two rows, by functions of s = dt²; 1 − cos √s is computed as s
-    sinroot(s/4)²/2.
+    """Return the increments for a matrix A with two rows, by functions of s = dt², where (A − τ/2)² = −d with the trace
+    τ of A.
+
+    1 − cos √s is computed as s sinroot(s/4)²/2.
     """
     (a, b), (c, d) = motion.matrix
     half_trace = ring.tower.constant(Fraction(1, 2)) * (a + d)

@@ -20,7 +20,7 @@ from phigen.splitting.ring import TIME, Monomial, Ring
 from phigen.symbolic.expression import Expression, call, sqrt, symbol, total
 from phigen.symbolic.tower import Poly
 
-#: Words for reports that describe the two motions.
+#: Descriptions of the two motions, for reports.
 BOOSTED, DRAWN = "moved on a sphere, as by a boost", "moved on a sphere along meridians"
 
 

@@ -212,8 +212,10 @@ def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expre
 
 
 def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:
-    """Return the time derivatives of the increments; ``slopes`` are those of the entries of matrix exponentials, by
-    symbol."""
+    """Return the time derivatives of the increments.
+
+    ``slopes`` maps the symbols of the entries of matrix exponentials to the time derivatives of these entries.
+    """
     rates = derivatives(increments, TIME)
     if not slopes:
         return rates

@@ -59,7 +59,7 @@ def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
 
 
 def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
-    """Return the terms, with a sum in place of all terms that depend on the same set of coordinates.
+    """Sum all terms that depend on the same set of coordinates, and return the resulting list of terms.
 
     Constants are added to the first of the sums.
     """
