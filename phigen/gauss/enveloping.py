@@ -1,15 +1,16 @@
-"""Star algebras of simple Lie algebras for which phigen knows no matrices: quotients of universal enveloping algebras.
+"""Star algebras of simple Lie algebras without known matrices, as quotients of universal enveloping algebras.
 
 Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S
 is a g-module of symmetric elements such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is spanned by a
 central skew element z, and is only needed for sl(n) and su(n). S is an eigenspace of the Casimir operator on Sym² g.
 The products of elements of g with a, b in g and f in S are
 
-    ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a),
+    ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a).
 
-where κ is the Killing form, σ the projection on S, τ its transpose, and ι an isomorphism of g and S. The condition that
-these products represent g gives linear equations for c, μ and ν. All other products follow from them. The Lie
-algebras gl(n) and u(n) have the star algebras of sl(n) and su(n), where z spans their centre.
+Here κ is the Killing form, σ the projection on S, and τ the transpose of σ. a▷f is the action of a on f, ι is an
+isomorphism of g and S, and ⟨a, ι(b)⟩ = κ(a, b). The condition that these products represent g gives linear equations
+for c, μ and ν. All other products follow from them. The Lie algebras gl(n) and u(n) have the star algebras of sl(n) and
+su(n), where z spans their centre.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.tower import rational
 
-#: Largest dimension of the Lie algebra: that of sp(6). Its star algebra has 36 dimensions, as many as MOST_UNKNOWNS
-#: allows.
+#: Largest dimension of the Lie algebra: the dimension of sp(6). The star algebra of sp(6) has 36 dimensions, which is
+#: MOST_UNKNOWNS.
 MOST_SIMPLE = 21
 
-#: Largest number of nonzero structure constants of a star algebra. The star algebras of Lie algebras that phigen knows
-#: by name have up to 1,700, in permuted and scaled bases. For so(5) in a dense basis there are 4,000: then the tangent
-#: map of a stage takes 120,000 operations, more than programs may have.
+#: Largest number of nonzero structure constants of a star algebra. Those of Lie algebras that phigen knows by name have
+#: at most 1,700, also after permuting and scaling the basis. For so(5) in a dense basis there are 4,000: then the
+#: tangent map of a stage takes 120,000 operations, more than programs may have.
 MOST_TERMS = 2000
 
 
@@ -118,8 +119,8 @@ def _unit_rows(m: int) -> list[list[fmpq]]:
 def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: int, simple: int) -> fmpq_mat:
     """Return the adjoint matrix ad e_k of basis element ``k`` of [g, g], in the basis of [g, g].
 
-    ``ad`` are the adjoint matrices of the Lie algebra g, ``basis`` and ``inverse`` are its adapted basis and the
-    inverse, and ``simple`` is dim [g, g].
+    ``ad`` are the adjoint matrices of the Lie algebra g, and ``simple`` is dim [g, g]. ``basis`` is the basis of g that
+    `_derived_and_centre` returns, and ``inverse`` its inverse.
     """
     m = len(ad)
     total = _matrix(m, m)
@@ -132,8 +133,8 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
     """Yield the candidates for the module S of symmetric elements in a star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-    They fit the dimension of the Lie algebra g; those with the smallest A come first. ``ad`` are the adjoint matrices
-    of g, and ``centre`` is the dimension of its centre.
+    They are the modules that exist for a Lie algebra g of this dimension. Modules with the smallest A come first.
+    ``ad`` are the adjoint matrices of g, and ``centre`` is the dimension of the centre of g.
     """
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
@@ -321,10 +322,11 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by all basis elements of the star algebra A = K ⊕ g ⊕ S ⊕ Z.
+        """Return the matrices of left multiplication by all basis elements of the star algebra A = K ⊕ g ⊕ S ⊕
+        Z.
 
-        ``left`` has those for the Lie algebra g. Elements of S and Z are combinations of products of elements of g.
-        Returns None if these products do not span S.
+        ``left`` has the matrices for the basis elements of g. Elements of S and Z are combinations of products of
+        elements of g. Returns None if these products do not span S.
         """
         m, d, size = len(self.ad), len(self.tensors), self.size
         identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
@@ -351,8 +353,8 @@ class _Module:
     ) -> fmpq_mat:
         """Return the matrix of left multiplication by the central element z.
 
-        It follows from the product af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) of any a in the Lie algebra and f in S with ⟨a,
-        f⟩ ≠ 0; see the head of the module.
+        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z); see the head of the module. Here a is an element of the Lie
+        algebra, and f an element of S with ⟨a, f⟩ ≠ 0.
         """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
@@ -426,8 +428,7 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # The star algebra has the basis 1, [g, g], S, z. These are the positions there of the elements in the rows of
-    # ``basis``.
+    # The star algebra has the basis 1, [g, g], S, z. Row k of ``basis`` is the element number row_numbers[k] there.
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

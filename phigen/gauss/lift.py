@@ -58,8 +58,8 @@ def momentum_form(
 ) -> dict[tuple[int, int], Scalar]:
     """Return the momentum k̃(U a U*) for a = ``element`` as a quadratic form in the components of U.
 
-    The functional k̃ adds the k-components of all copies of the quaternions. The form maps ascending pairs of indices
-    of components to coefficients.
+    The functional k̃ adds the k-components of all copies of the quaternions. The result maps pairs (i, j) with i ≤ j to
+    the coefficient of U_i U_j.
     """
     unit, last = algebra.field.one, {copy[3] for copy in copies}
     form: dict[tuple[int, int], Scalar] = {}

@@ -17,8 +17,7 @@ from phigen.geometry.linear import Span, add_multiple, kernel
 from phigen.geometry.matrix_algebras import product
 from phigen.geometry.representations import known_representation
 
-#: Largest dimension of a star algebra. Evaluating the vector field at one stage takes a number of operations that grows
-#: as the power 3/2 of the dimension.
+#: Largest dimension of a star algebra. The vector field at one stage takes about dimension^(3/2) operations.
 MOST_UNKNOWNS = 36
 
 
@@ -77,11 +76,11 @@ def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
 
 
 def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
-    """Return a linear projection π of the Lie algebra onto an ideal. Entry k·m + i of the returned vector is the entry
-    of the matrix π in row k and column i.
+    """Return a linear projection π of the Lie algebra onto an ideal such that π([X, Y]) = X π(Y) − Y π(X) for
+    all X, Y.
 
-    m is the dimension of the Lie algebra, and π([X, Y]) = X π(Y) − Y π(X) for all X, Y. Returns None if there is no
-    such π.
+    Entry k·m + i of the returned vector is the entry of the matrix π in row k and column i, where m is the dimension of
+    the Lie algebra. Returns None if there is no such π.
     """
     m, size, field = lie.dimension, len(ideal), lie.field
     last = size * m
@@ -209,9 +208,10 @@ def _functional(
     basis: Sequence[Vector],
     field: Field,
 ) -> list[Vector] | None:
-    """Return the functional x̃ of a point x at each basis element of the matrix algebra ``hull``, as linear forms in x.
+    """Return the values of the functional x̃ at the basis elements ``hull`` of a matrix algebra, as linear forms in a
+    point x.
 
-    x̃(E_a) = x_a for the matrices E_a of the Lie algebra. x̃ vanishes on symmetric elements, and on the skew elements
+    x̃(E_a) = x_a for the matrices E_a of the Lie algebra. x̃ vanishes on symmetric elements, and on those skew elements
     that are orthogonal to the Lie algebra by the trace form tr ab. Returns None if there is no such functional.
     """
     half = field.one / field.number(2)
@@ -226,7 +226,7 @@ def _functional(
         part = {i: half}
         add_multiple(part, star[i], half)
         symmetric.append(part)
-    # These are linear equations for elements that are skew and orthogonal to the Lie algebra.
+    # The solutions of these linear equations are the elements that are skew and orthogonal to the Lie algebra.
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     solutions = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
     if Span(field, skew).dimension == len(basis):  # all skew elements are in the Lie algebra, as for se(n)

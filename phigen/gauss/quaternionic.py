@@ -1,11 +1,12 @@
 """Star algebras of quaternionic type: quaternions over a commutative algebra K, with the Lie algebra g as skew
 elements.
 
-A = K ⊕ g with ab = β(a, b) + ½[a, b] for a, b in g, where K commutes with all elements. A exists if there is a
-symmetric β, whose values are linear maps of g that commute with the bracket, and that satisfy [[a, b], c] = 4(β(b, c)a
-− β(a, c)b). K is spanned by the identity and these maps. A is the algebra of quaternions for so(3), that of 2×2
-matrices for sl(2), that of quaternions with complex coefficients for so(3,1), and that of quaternions with dual
-coefficients for se(3). Heisenberg algebras have β = 0, and so(4) gives two copies of so(3).
+The star algebra is A = K ⊕ g. Its products are ab = β(a, b) + ½[a, b] for a, b in g, and K commutes with all elements.
+β is symmetric, and its values are linear maps of g that commute with the bracket. A exists if there is a β with [[a,
+b], c] = 4(β(b, c)a − β(a, c)b). K is the algebra of linear maps that the values of β and the identity generate. A is
+the algebra of quaternions for so(3), that of 2×2 matrices for sl(2), that of quaternions with complex coefficients for
+so(3,1), and that of quaternions with dual coefficients for se(3). Heisenberg algebras have β = 0, and so(4) gives two
+copies of so(3).
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from phigen.symbolic.tower import rational
 #: Linear map of g: its entries by (row, column).
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest dimension of a Lie algebra. The number of unknowns in the linear equations for the products grows as its
-#: third power.
+#: Largest dimension of a Lie algebra. The products solve linear equations, and the number of unknowns in these
+#: equations grows as the third power of the dimension.
 MOST_QUATERNIONIC = 12
 
 
@@ -68,19 +69,21 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
 
 
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
-    """Return the symmetric form β with [[a, b], c] = 4(β(b, c)a − β(a, c)b), whose values are combinations of ``maps``.
+    """Return the symmetric form β with [[a, b], c] = 4(β(b, c)a − β(a, c)b), whose values are combinations of
+    ``maps``.
 
-    It has a linear map of the Lie algebra for each pair (i, j) of basis elements. Returns None if β does not exist.
+    The result maps each pair (i, j) to the linear map β(e_i, e_j), with basis elements e_i. Returns None if β does not
+    exist.
     """
     m, count = len(ad), len(maps)
     pair_numbers = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
     four, last = field.number(4), len(pair_numbers) * count
 
     def unknowns(i: int, j: int, component: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
-        """Yield sign·4·β(e_i, e_j)e_c for basis element c = ``component``, as pairs of a row and a linear form in the
-        unknowns.
+        """Yield the terms of sign·4·β(e_i, e_j)e_c, where c is ``component``.
 
-        The unknowns are the coefficients of each β(e_i, e_j) in the basis ``maps``.
+        Each term is a pair: a row of this vector, and a linear form in the unknowns. The unknowns are the coefficients
+        of each β(e_i, e_j) in the basis ``maps``.
         """
         pair_number = pair_numbers[max(i, j), min(i, j)]
         for number, phi in enumerate(maps):
@@ -171,10 +174,11 @@ def _assembled(
 
 
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
-    """Return a star algebra K ⊕ g as the direct sum of two algebras, if K has two dimensions and a rational idempotent.
+    """Return a star algebra K ⊕ g as the direct sum of two algebras, by a rational idempotent of K, the commutative
+    part.
 
-    K is the commutative part, and ``count`` its dimension. Returns the algebra unchanged if there is no such
-    idempotent.
+    ``count`` is the dimension of K. If it is not 2, or if there is no rational idempotent, the algebra is returned
+    unchanged.
     """
     field, unit = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None

@@ -1,11 +1,11 @@
 """Realisations of systems for Gauss methods: choices of unknowns with which a step is a Poisson map.
 
 Coordinates with constant brackets are unknowns themselves, since Gauss methods are symplectic. Coordinates with the
-brackets of a Lie algebra are written as functions of a group element G, which is 1 at the start of each step and to
-which the method is applied (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are
-written as exponentials of unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and
-constant two-forms, and commute with linear maps. The space of group elements has a constant two-form, so the step of G
-preserves this two-form. Therefore the step of x is exactly a Poisson map, and preserves all Casimirs.
+brackets of a Lie algebra are functions of a group element G (`phigen.gauss.star_algebra`). G is 1 at the start of each
+step, and the method is applied to G. Coordinates whose logarithms have constant brackets are written as exponentials of
+unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and constant two-forms, and
+commute with linear maps. The space of group elements has a constant two-form, so the step of G preserves this two-form.
+Therefore the step of x is exactly a Poisson map, and preserves all Casimirs.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 
 @dataclass(frozen=True)
 class Plain:
-    """Part of a system: coordinates, given by their indices, that are themselves unknowns of the Gauss method.
+    """Part of a system: the coordinates ``indices``, which are themselves unknowns of the Gauss method.
 
-    If their brackets are not constant, a step is a Poisson map only up to its order.
+    If their brackets are not constant, a step is a Poisson map only up to the order of the method.
     """
 
     indices: tuple[int, ...]
@@ -41,7 +41,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class LogarithmicBlock:
-    """Part of a system: coordinates, given by their indices, whose logarithms are unknowns of the Gauss method.
+    """Part of a system: the coordinates ``indices``, whose logarithms are unknowns of the Gauss method.
 
     Brackets of the logarithms with each other and with plain coordinates are constant. ``rates`` maps (i, j) to the
     bracket {log x_i, x_j}.
@@ -53,13 +53,13 @@ class LogarithmicBlock:
 
 @dataclass(frozen=True)
 class AlgebraBlock:
-    """Part of a system: coordinates, given by their indices, with the brackets of a Lie algebra ``lie``. A group
-    element G is the unknown.
+    """Part of a system: the coordinates ``indices``, which have the brackets of the Lie algebra ``lie``. The unknown is
+    a group element G.
 
     The functions x_i + ``shift``_i are a momentum map of the star algebra ``algebra``. If ``central`` is set, the last
     basis element of the Lie algebra has no coordinate: its value is the constant 1. ``ideal`` lists the basis elements
-    of a square-zero ideal; the components of G along these are replaced by functionals (`phigen.gauss.square_zero`). It
-    is () if there is no such ideal. ``copies`` lists copies of the quaternions if G starts from a frame F in place of 1
+    of a square-zero ideal, or is () if there is none. Functionals replace the components of G along the ideal
+    (`phigen.gauss.square_zero`). ``copies`` lists copies of the quaternions if G starts from a frame F in place of 1
     (`phigen.gauss.lift`), else it is ().
     """
 
@@ -171,8 +171,10 @@ def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Pa
 
 
 def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] | None:
-    """Return the parts of all diagonal blocks of π, whose coordinates have no brackets with other blocks; None if π is
-    one block, or if phigen knows no parts for a block.
+    """Return the parts of all diagonal blocks of π. Coordinates of a block have no brackets with those of other
+    blocks.
+
+    Returns None if π is one block, or if phigen knows no parts for a block.
     """
     blocks_of_poisson = blocks(coordinates, poisson)
     if len(blocks_of_poisson) < 2:
@@ -189,9 +191,10 @@ def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] 
 
 
 def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
-    """Return a part of a block with the indices of its coordinates among all coordinates of the system.
+    """Return a part with indices among all coordinates of the system. In ``part``, indices count the coordinates of a
+    block.
 
-    In ``part``, indices count the coordinates of the block. ``block`` has the indices of these among all coordinates.
+    ``block`` maps the old indices to the new ones.
     """
     indices = tuple(block[i] for i in part.indices)
     if isinstance(part, LogarithmicBlock):
@@ -229,8 +232,8 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
         extension = shape.extension
         unit_index = extension.dimension - 1
         linear = {ij: {k: c for k, c in row.items() if k != unit_index} for ij, row in extension.constants.items()}
-        # A bracket that is constant couples its two coordinates too. Here it is replaced by a multiple of the first
-        # coordinate, so that `indecomposable_parts` sees the coupling.
+        # A constant bracket couples its two coordinates as well. So that `indecomposable_parts` sees this, a multiple
+        # of the first coordinate takes the place of the constant.
         completed = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
         for indices in indecomposable_parts(LieAlgebra("", unit_index, completed)):
             pairs = [ij for ij in extension.constants if set(ij) <= set(indices)]

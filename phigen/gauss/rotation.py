@@ -1,8 +1,8 @@
 """Attitudes for Gauss steps: the group element of a step as a rotation, by a homomorphism to dual quaternions.
 
 A dual quaternion q + εr with ε² = 0 stands for the rotation q and the translation 2r q̄. The homomorphism maps the
-elements E_a that generate rotations to ½i, ½j, ½k or to −½i, −½j, −½k, by the sign of the bracket. It maps generators
-of translations to ε times these, and all other E_a to 0.
+basis elements of the Lie algebra that generate rotations to ½i, ½j, ½k or, for the opposite sign of the brackets, to
+−½i, −½j, −½k. It maps generators of translations to ε times these, and all other basis elements to 0.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Dual = list[Scalar]
 def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
     """Return the attitude increment of a Gauss step as a function of the unknowns: its quaternion minus 1.
 
-    The three components of the translation follow if the group has translations. Returns None if the coordinates that
-    belong to rotations are in no star algebra, or if there is no homomorphism to dual quaternions.
+    If the group has translations, the three components of the translation are added to the list. Returns None if the
+    coordinates that belong to rotations are in no star algebra, or if there is no homomorphism to dual quaternions.
     """
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):
@@ -90,7 +90,8 @@ def _combination(algebra: StarAlgebra, factors: Vector, images: Sequence[Dual]) 
 def _generate(algebra: StarAlgebra, elements: list[Vector], images: list[Dual]) -> None:
     """Append products of elements, and the products of their images, until the elements span the algebra.
 
-    It ends earlier if no product is linearly independent of the elements.
+    Each new product is linearly independent of the elements before it. The function returns early if there is no such
+    product.
     """
     generators = len(elements)
     for k in count():

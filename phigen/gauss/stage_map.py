@@ -38,13 +38,14 @@ OFFSET, FRAME = "z", "frame"
 
 @dataclass(frozen=True)
 class StageMap:
-    """The state at a stage of a Gauss step, as a function of the state at the start of the step and of the unknowns.
+    """The state at a stage of a Gauss step, as a function of the state at the start of the step and of the
+    unknowns.
 
-    ``unknowns`` are names of symbols, in this order: the offsets of the coordinates with the indices ``moved``; the
+    ``unknowns`` are names of symbols. Their order is: the offsets of the coordinates with the indices ``moved``; the
     offset of the time if H depends on the time; the offsets of the functionals λ of star algebras with ideals; the
     offsets of the logarithms of the coordinates with the indices ``scaled``; the components of the group elements,
-    minus 1 or minus the frame F. ``places`` has, for each group, the indices of the unknowns of its group element, then
-    those of its functional. ``change`` is x − x_start for each coordinate.
+    minus 1 or minus the frame F. ``places`` has one tuple for each group: the indices of the unknowns of the group
+    element, then those of the functional. ``change`` is x − x_start for each coordinate.
     """
 
     system: System
@@ -64,7 +65,9 @@ class StageMap:
 
     @property
     def plain(self) -> int:
-        """The number of unknowns with the scale of the state: coordinates, time, functionals. They come first."""
+        """The number of unknowns for coordinates, time and functionals. These unknowns come first, and scale with the
+        state.
+        """
         groups = self.realisation.groups
         return len(self.moved) + len(self.system.times) + sum(len(g.subalgebra) for g in groups if g.ideal)
 
@@ -153,11 +156,12 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A functional x̃ of the momenta on a star algebra, and frame elements f, both scaled by numbers: x̃/q and f/c.
+    """The functional x̃ of the momenta on a star algebra, and the frame elements f, after division by numbers: x̃/q and
+    f/c.
 
-    The numbers q and c are chosen such that products need few multiplications by constants. ``at_basis`` has x̃/q at
-    the basis elements of the algebra, ``frame`` the elements f/c. ``combination`` has the coefficients by which the
-    momenta x̃(E_a) are combinations of the values of x̃/q at the f/c.
+    The numbers are chosen such that products need few multiplications by constants. ``at_basis`` has the values of x̃/q
+    at the basis elements of the algebra, and ``frame`` has the elements f/c. The momenta x̃(E_a) are linear
+    combinations of the values of x̃/q at the f/c, with the coefficients ``combination``.
     """
 
     at_basis: list[Expression]
@@ -185,8 +189,8 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
 
 
 def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the offset of a group element from its start, as an element w of the star algebra, from the unknowns of a
-    group.
+    """Return the element w of the star algebra by which a group element differs from its start; ``offsets`` are the
+    unknowns.
 
     Components in the square-zero ideal of the group have no unknowns; they are 0.
     """
@@ -218,9 +222,10 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
     """Return the changes of the momenta x_a since the start of a step, as functions of the unknowns, without
     cancellation.
 
-    They are x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and its basis E_a of the Lie algebra. For G =
-    1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ + u, it
-    is u(E_a) + λ(E_a w*). With frames it is the change of the quadratic forms k̃(U E_a U*).
+    A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and its basis E_a of the Lie algebra. For
+    G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, an E_a outside the ideal
+    has the change u(E_a) + λ(E_a w*) instead, where the functional is λ = x̃ + u with the unknown u. With frames, the
+    change is that of the quadratic form k̃(U E_a U*).
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
@@ -278,8 +283,8 @@ def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> t
 def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
     """Return x̃(Gb)/q for a group element G and the basis elements b of the star algebra.
 
-    x̃ is the functional of the momenta, and q a number (`_Scaled`). If the group has an ideal, the values at the basis
-    elements of the subalgebra are λ(b)/q, with the functional λ that is an unknown.
+    x̃ is the functional of the momenta, and q a number (`_Scaled`). If the group has an ideal, there is an unknown
+    functional λ. For elements b of the subalgebra, the result then has λ(b)/q instead.
     """
     scaled = _scaled(group, group_values(points.system, group))
     left = _functional_times(group.algebra, scaled, _element_at(points, group, places))
@@ -357,8 +362,8 @@ def vector_field(
 
     ``stage_values`` has the coordinates and the time at the stage by name. ``slopes`` replaces ∇H if it is not None.
     Group elements follow Ġ = Gξ with a velocity ξ in the Lie algebra; ``hold`` replaces each component of ξ by another
-    expression. With ``collected``, components of ξ that are affine in the momenta are written as sums over the momenta
-    x̃(G f G*) of the frame elements f.
+    expression. If ``collected``, components of ξ that are affine in the momenta are written in a shorter form: as sums
+    over the values x̃(G f G*) at the frame elements f.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -475,7 +480,7 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return, for each copy of the quaternions in a star algebra, the vector y of the momenta: x̃(q) = y·Im q.
+    """Return the vectors y with x̃(q) = y·Im q for all copies of the quaternions in star algebras.
 
     The result is a single list. It has three components for each copy, in the order of i, j, k. At the start of a step,
     the frame F satisfies F* k F = y (`phigen.gauss.lift`).
@@ -489,11 +494,11 @@ def lifted_functionals(points: StageMap) -> list[Expression]:
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
-    """Transform ``slopes``, derivatives of the unknowns, to the frame at the end of the step, where the next step
-    starts.
+    """Return the derivatives of the unknowns in the frame at the end of the step, where the next step starts.
 
-    Derivatives of a group element G are multiplied by G* = G⁻¹ from the left. Derivatives of functionals λ in place of
-    an ideal are transformed likewise. Derivatives of coordinates, time and logarithms do not change.
+    ``slopes`` has the derivatives in the present frame. Those of a group element G are multiplied by G* = G⁻¹ from the
+    left. Those of functionals λ in place of an ideal are transformed accordingly. Derivatives of coordinates, time and
+    logarithms do not change.
     """
     values = list(slopes)
     for group, places in zip(points.realisation.groups, points.places, strict=True):
@@ -516,11 +521,12 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Transform derivatives ``k`` of the functional λ (`phigen.gauss.square_zero`) to the frame at the end of a step.
+    """Return the derivatives of the functional λ (`phigen.gauss.square_zero`) in the frame at the end of a
+    step.
 
-    The result is k(bg*) − λ(sg*) for all basis elements b of the subalgebra. ``turned`` is the derivative ġ in the new
-    frame, and s is the symmetric part of ġb. The second term follows from nb + gn* = 0 at the end of a step, where G =
-    g + n.
+    ``k`` has the derivatives in the present frame. The result is k(bg*) − λ(sg*) for all basis elements b of the
+    subalgebra. ``turned`` is the derivative ġ in the new frame, and s is the symmetric part of ġb. The second term
+    follows from nb + gn* = 0 at the end of a step, where G = g + n.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

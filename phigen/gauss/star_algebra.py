@@ -59,8 +59,8 @@ class StarAlgebra:
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return x̃(a), the value of the functional x̃ of a point x, as a linear form in x: coefficients by the index
-        of x_k.
+        """Return x̃(a), the value of the functional x̃ of a point x, as a linear form in x: it maps k to the
+        coefficient of x_k.
         """
         return combined(self.functional, a)
 
@@ -84,7 +84,7 @@ class StarAlgebra:
         """Yield the axioms by which coordinates are a momentum map: the name of each axiom, and an iterator of
         residuals.
 
-        An axiom holds if all its residuals are empty.
+        An axiom holds if all residuals are 0, that is, vectors without entries.
         """
         n, unit = range(self.dimension), self.field.one
         units = [{i: unit} for i in n]
@@ -141,10 +141,10 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield the residuals x̃([u, n]) for all skew elements u and all n in N. Here N are the skew elements on which
-        every functional x̃ is 0.
+        """Yield x̃([u, n]) for all skew elements u and all n in N, where N has the skew elements on which every
+        functional x̃ is 0.
 
-        The residuals are 0 if and only if N is an ideal of the Lie algebra of all skew elements.
+        These values are 0 if and only if N is an ideal of the Lie algebra of all skew elements.
         """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):

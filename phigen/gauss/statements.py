@@ -41,7 +41,8 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
 
-#: Largest residual of the order conditions that rounding the coefficients to double precision can explain.
+#: Bound for the residuals of the order conditions: smaller residuals are the effect of rounding coefficients to
+#: doubles.
 ROUNDED = Fraction(1, 10**15)
 
 
@@ -164,9 +165,9 @@ def _functionals(system: System, points: StageMap) -> Statement:
 
 
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
-    """Decide whether the step with the unknowns U − F, where U = FG, is the step with the unknowns G − 1.
+    """Decide whether two choices of unknowns give the same step: U − F with U = FG, and G − 1.
 
-    G is a group element, and F its frame at the start of the step, where x̃(q) = k̃(FqF*) holds (see
+    G is a group element. F is the frame at the start of the step, which satisfies x̃(q) = k̃(FqF*) (see
     `phigen.gauss.lift`).
     """
     others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
@@ -189,7 +190,7 @@ def _differences(
     values: Mapping[str, Expression],
     states: Mapping[str, Expression],
 ) -> list[tuple[str, Expression]]:
-    """Return the differences between the steps of two sets of unknowns, in the changes of x and in the
+    """Return the differences between the steps of two sets of unknowns: differences of the changes of x and of the
     velocities.
 
     The symbols "slope" stand for ∇H. So if the differences are 0, the steps are equal for any H. ``values`` has the
@@ -227,8 +228,8 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Decide two statements on unknowns that are all 0: they belong to the state at the start of a step, and the
-    derivative of the state there is π∇H.
+    """Decide two statements on a stage whose unknowns are all 0: its state is that at the start of the step, and the
+    derivative of the state is π∇H.
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
