@@ -1,2 +1,1 @@
-"""Certificates: proofs of an upper bound for the distance of a computed step, with rounding, from the exact Poisson
-map."""
+"""Certificates: proofs that a computed step, with all rounding errors, is within a bound of the exact Poisson map."""

@@ -40,8 +40,8 @@ OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # name → value,
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
 }  # fmt: skip
-# Number of terms of the power series below. Coefficient n is at most 2^(1-n), so for |s| < ROUNDED all further terms
-# together are at most 2^(3-TERMS).
+# Number of terms of the power series below. The coefficient of s^n is at most 2^(1-n). So for |s| < ROUNDED the sum of
+# all further terms is at most 2^(3-TERMS).
 TERMS = 90
 SERIES: Mapping[str, Callable[[int], fmpq]] = {  # functions that the C computes by polynomials → Taylor coefficient n
     "cosroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n)),
@@ -133,8 +133,7 @@ class Evaluation:
         powers, v = set[int](), self.x
         for k, (op, *a) in enumerate(operations):
             error, slopes = ZERO, list[tuple[int, Ball]]()
-            # "number" is a decimal literal, which is rounded if it is no double; "constant" is a value of the
-            # certificate
+            # "number" is a decimal literal of the C, rounded to a double; "constant" is a value in the certificate
             if op in ("number", "exact", "constant"):
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
                 x, error = arb(value), U * abs(value) * (op == "number" and Fraction(repr(value)) != value)
@@ -147,8 +146,8 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # The omitted terms of a Taylor series are bounded by three times the next terms. The factor 3 covers
-            # derivatives too.
+            # The sum of the omitted terms of a Taylor series is bounded by three times the next terms. The factor 3
+            # covers derivatives too.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -238,10 +237,11 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return intervals that contain some outputs of a stage with their rounding errors, by the mean value theorem.
+    """Return intervals that contain some outputs of a stage with their rounding errors, by the mean value
+    theorem.
 
-    ``of`` is the key of the stage that lists these outputs. The expansion is about the midpoints of X and of ``box``.
-    For small boxes the intervals are narrower than those of `run_of`.
+    The outputs are those that the stage lists under the key ``of``. The expansion is about the midpoints of X and of
+    ``box``. For small boxes the intervals are narrower than those of `run_of`.
     """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
@@ -266,10 +266,10 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
 
 
 def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
-    """Return change, error bound and derivative of an implicit stage, whose unknowns u solve u - base + d(u) = 0.
+    """Return change, error bound and derivative of an implicit stage. The unknowns u solve u - base + d(u) = 0.
 
-    The C solves the equation by repeated corrections: M^-1 times the residual. The fourth result bounds that part of
-    the change which the C adds to the compensation term.
+    The C solves the equation by repeated corrections: M^-1 times the residual. A part of the change is added to the
+    compensation term; the fourth result is a bound for this part.
     """
     box = [interval(v) for v in leaf["u"]]
     m, n, Y, centre = len(box), len(X), column(map(mag, box)), column(arb(v.mid()) for v in box)
@@ -281,12 +281,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        # bound for the rounding errors when the C solves linear equations with the matrix by elimination
+        # bound for the rounding errors of elimination, by which the C solves linear equations with the matrix
         pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
-    elif solves:  # instead of the printed matrix the C may use finite differences
+    elif solves:  # the C may use finite differences in place of this matrix
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
@@ -295,18 +295,21 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
 
     def residual_error(e: Matrix) -> Matrix:
-        """Return bounds for the rounding errors of the residual, if u is at the distance e from the solution."""
+        """Return bounds for the rounding errors of the residual, if the distance of u from the solution is at
+        most e.
+        """
         first = d_error + U * (size + e + c["carry"] * U * Y) * based
         return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """Return a bound for the error of u after a correction, if its error before the correction is at most e."""
+        """Return bounds for the error of u after a correction, if its error before the correction is at most e."""
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """Return the largest error of u that is possible if the C has measured a correction or residual of at most
-        ``size``."""
+        """Return bounds for the error of u, if the correction or residual that the C has measured is at most
+        ``size``.
+        """
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
     C = each(middle, each(middle, A).inv())
@@ -320,14 +323,15 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # a series ends after two small terms, but not before a larger one
+    if stage.get("seen"):  # a large term shows that the C does not end the series before it
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    # Each rule that ends the iteration limits the last correction ("now"), the one before it, or their ratio ("part").
+    # Each rule that ends the iteration limits the last correction ("now"), the correction before it ("before"), or the
+    # ratio of both ("part").
     for stop in stage["stops"]:
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
@@ -347,12 +351,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return, for the corrections of an implicit stage, bounds for the contraction rate and for the rounding noise, and
-    a factor between norms.
+    """Return bounds for the contraction rate and for the rounding noise of the corrections of an implicit stage, and a
+    factor between two norms.
 
-    The bounds are in the norm by which the C measures corrections: for a Gauss method the root mean square over its
-    stages, for other methods the maximum. The factor is the 2-norm divided by the norm of the C for a Gauss method, and
-    1 for other methods. ``factor`` bounds one correction by the correction before.
+    The bounds are in the norm by which the C measures corrections. For a Gauss method this is the root mean square over
+    the stages of the method, and the factor is the 2-norm divided by this norm. For other methods the norm is the
+    maximum, and the factor is 1. ``factor`` has bounds for a correction in terms of the correction before it.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
@@ -386,7 +390,7 @@ def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
 
 
 def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, list[float]]:
-    """Check the certificate on all boxes of a tree, into which the domain is divided.
+    """Check the certificate on all boxes of a tree. The tree divides the domain into boxes.
 
     Return the number of boxes, and the largest absolute value of each coordinate. Raises `RefusedError`.
     """

@@ -22,15 +22,16 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Functions that occur in exact flows and that certificates do not cover → the motion, as error messages name it.
+#: Functions that certificates do not cover, by name; each with the motion whose exact flow contains it, as error
+#: messages name the motion.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
     ANOMALY: "a Kepler motion",
 }
 
-#: Motions that can be split into parts, by a composition that the key ``composition`` of specs names. Certificates
-#: cover the flows of these parts.
+#: Motions that phigen divides into simpler parts if a spec names a ``composition``. Certificates cover the flows of
+#: these parts.
 _SPLIT = ("a free rigid body", "a Kepler motion")
 
 
@@ -47,8 +48,8 @@ def problem_of(
 ) -> StepProblem:
     """Return the problem to be certified for the C ``text`` of a solver.
 
-    Casimirs are subtracted from H with the multiples (the gauge) that the solver chooses for the state ``start``.
-    Raises `SpecError` for solvers that certificates do not cover.
+    The solver subtracts multiples of Casimirs from H, the gauge; the problem contains those that it chooses for the
+    state ``start``. Raises `SpecError` for solvers that certificates do not cover.
     """
     program, spec = compilation.program, compilation.spec
     _expect_covered(program, spec)
@@ -90,7 +91,8 @@ def _expect_covered(program: Program, spec: Spec) -> None:
 def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Sequence[float]) -> list[float]:
     """Return the gauge that the solver chooses at the state ``start``, up to rounding.
 
-    The gauge are the multiples of Casimirs that are subtracted from H or, with a monitor, the energy level e = −H.
+    The gauge consists of the multiples of Casimirs that are subtracted from H. With a monitor, the result is the energy
+    level e = −H instead.
     """
     program = compilation.program
     values = {**parameters, **dict(zip(compilation.spec.coordinates, start, strict=True))}

@@ -32,20 +32,21 @@ from phigen.certify.stages import CARRY, stages_of
 #: Largest number of attempts to find a box that provably contains the unknowns of an implicit step.
 PASSES = 8
 
-#: Factor by which the box of unknowns is made larger than estimated. A smaller factor needs more attempts; with a
-#: larger one it is harder to prove that the iteration contracts.
+#: Factor between the box of unknowns and its estimate. A smaller factor needs more attempts; with a larger factor it is
+#: harder to prove that the iteration contracts.
 GROWTH = 1.25
 
-#: Largest compensation term after a Gauss step, in units of 2^-53 times the largest value of the coordinate. The term
-#: contains the rounding error of the state, and that of its change, which is at most twice as large.
+#: Largest compensation term after a Gauss step, in units of 2^-53 times the largest absolute value of the coordinate.
+#: The term is the sum of two rounding errors: that of the state, at most 1 unit, and that of the change of the state,
+#: at most 2 units.
 GAUSS_CARRY = 3.03
 
-#: Bounds for the distance of iterates from the solution of a Gauss step are at least this fraction of the largest
-#: bound, since each iteration couples all unknowns.
+#: For a Gauss step, an iterate has one bound for each unknown: the bound for its distance from the solution. All bounds
+#: are at least this fraction of the largest one, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
-#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for steps whose C
-#: uses difference quotients. The addition exceeds the distances of the points at which these quotients are evaluated.
+#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns. It is needed if the
+#: C uses difference quotients, and is larger than the differences of the unknowns in these quotients.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.
@@ -55,7 +56,7 @@ Box = Sequence[Sequence[float]]
 
 
 class NoCertificateError(RefusedError):
-    """No certificate was found; ``hint`` tells the user what to change."""
+    """Error if no certificate was found; ``hint`` tells the user what to change."""
 
     def __init__(self, message: str, hint: str) -> None:
         super().__init__(message)
@@ -66,10 +67,10 @@ class NoCertificateError(RefusedError):
 class StepProblem:
     """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
 
-    ``text`` is the C; ``members`` maps names of parameters in C to those of the spec. ``gauge`` are the multiples of
+    ``text`` is the C; ``members`` maps names of parameters in C to those of the spec. ``gauge`` has the multiples of
     Casimirs that are subtracted from H or, with a monitor, the energy level e. ``ulps`` is a bound for the errors of
-    libm, and ``within`` the largest error bound that is accepted, both in units in the last place. ``timed`` says that
-    steps depend on the time.
+    functions of libm. A certificate with an error bound above ``within`` is not accepted. ``ulps`` and ``within`` are
+    in units in the last place. ``timed`` says that steps depend on the time.
     """
 
     name: str
@@ -87,10 +88,11 @@ class StepProblem:
 
 
 def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
-    """Return the entries of a certificate other than boxes and bounds: the problem, and the operations of a step.
+    """Return the entries of a certificate other than boxes and bounds: the problem, and the operations of a
+    step.
 
-    With ``exact``, the operations are those of the exact map; its Taylor series have the largest number of terms that
-    the C allows. Raises `RefusedError` for C that certificates do not cover.
+    With ``exact``, the operations are those of the map that the step approximates; Taylor series then have the largest
+    number of terms that the C allows. Raises `RefusedError` for C that certificates do not cover.
     """
     facts = read(problem.text, problem.name)
     numbers = {

@@ -30,9 +30,9 @@ _TAPE = "if (tape != NULL) memcpy(tape++, x, sizeof *tape);"
 
 
 class GeneratedC:
-    """Generated C file, without comments and without the solver's name as a prefix of names.
+    """Generated C file, without comments. The name of the solver, which is the prefix of names, is removed.
 
-    Functions that would then have the same name as a function of libm get the prefix ``own_``.
+    If a function would then have the name of a function of libm, its prefix becomes ``own_``.
     """
 
     def __init__(self, text: str, name: str) -> None:
@@ -73,10 +73,10 @@ class GeneratedC:
 
 
 class KernelReader:
-    """The operations of one C function, in their order; a value that the C uses several times occurs once.
+    """The operations of one C function, in their order. A value that the C uses several times occurs once.
 
-    ``outputs`` maps each array that the function writes to the indices of the operations that give its entries. If the
-    function calls functions that the C defines by polynomials, these are added to ``series``.
+    ``outputs`` maps each array that the function writes to the operations that compute its entries, given by index. The
+    constructor adds functions that the C computes by polynomials to ``series``.
     """
 
     def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:
@@ -228,7 +228,9 @@ class PathReader(KernelReader):
 
 
 def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
-    """Return the polynomial by which the C computes a function for small arguments, and the largest such argument."""
+    """Return the polynomial by which the C computes a function of small arguments, and the bound for these
+    arguments.
+    """
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
     library_name = name.removeprefix("own_")
@@ -277,8 +279,8 @@ def _expect(function: tuple[list[str], str] | None, name: str) -> tuple[list[str
 
 
 def read(text: str, name: str) -> dict[str, Any]:
-    """Return the data about the C of a solver that a certificate needs: kind of step, functions as operations, and
-    tables.
+    """Return the data about the C of a solver that a certificate needs: the kind of step, the functions as lists of
+    operations, and tables.
 
     Raises `RefusedError` for C that certificates do not cover.
     """
@@ -299,8 +301,8 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Names of C functions that are read, by kind of step. A solver is of the first kind in this table for which the C has
-#: the last function in the list.
+#: Names of C functions that are read, by kind of step. The last name of a row identifies the kind: a solver has the
+#: first kind in this table whose last function is in the C.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
@@ -336,7 +338,8 @@ def _gauss(source: GeneratedC) -> dict[str, Any]:
 
 
 def _splitting(source: GeneratedC) -> dict[str, Any]:
-    """Return the tables of a splitting: times of flows, sequences of flows, and the coordinates that each flow changes.
+    """Return the tables of a splitting: durations of flows, sequences of flows, and the coordinates that each flow
+    changes.
 
     A method with a corrector has three sequences (inverse corrector, step, corrector), other methods have one.
     """
@@ -382,7 +385,8 @@ def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
 def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: list[list[int]]) -> list[list[int]]:
     """Execute parsed statements: append the flows that they call to ``called``, and return ``called``.
 
-    Each flow is [number, row of coefficients]. ``names`` has the values of loop variables and of ``coef``.
+    Each flow is appended as [number of the flow, row of coefficients]. ``names`` has the values of loop variables and
+    of ``coef``.
     """
     for kind, about in statements:
         if kind == "call":
@@ -424,7 +428,7 @@ def _integer_value(text: str, names: Mapping[str, int]) -> int:
 
 
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
-    """Return which coordinates a flow changes, as pairs [i, j]: it adds its increment j to coordinate i."""
+    """Return the coordinates that a flow changes, as pairs [i, j]: the flow adds its increment j to coordinate i."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:

@@ -15,11 +15,11 @@ from flint import arb, arb_mat, ctx
 
 from phigen.certify.checker import identity, run_of
 
-#: Precision, in bits, with which the exact map is computed.
+#: Precision in bits for the computation of the exact map.
 BITS = 300
 
-#: Largest number of corrections until the equation of a stage must be solved. Corrections converge linearly, since all
-#: use the same matrix.
+#: Largest number of corrections before the equation of a stage must be solved. Convergence is only linear, since all
+#: corrections use the same matrix.
 CORRECTIONS = 400
 
 #: If all corrections of the unknowns are smaller than this, the equation of a stage counts as solved.
@@ -38,8 +38,10 @@ def _precise() -> Iterator[None]:
 
 
 class ExactMap:
-    """The exact map that a step of a solver approximates, as a function; ``c`` is the result of `described` with
-    ``exact``."""
+    """The map that a step of a solver approximates, computed in many digits.
+
+    ``c`` is the result of `phigen.certify.prove.described` with ``exact``.
+    """
 
     def __init__(self, c: Mapping[str, Any]) -> None:
         self._c = c

@@ -12,7 +12,7 @@ from phigen.certify.checker import Evaluation, RefusedError, column
 from phigen.certify.reader import GeneratedC, PathReader
 
 #: Largest compensation term after a step, in units of 2^-53 times the largest absolute value of the coordinate. The
-#: term is the rounding error of one addition, at most 1 of these units, with a margin.
+#: term is the rounding error of one addition, which is at most 1 unit; the rest is a margin.
 CARRY = 1.01
 
 #: Least contraction rate that certificates assume. The C estimates this rate to decide when the iteration for a Gauss
@@ -71,8 +71,11 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of operations that read parameters, by their names in C; an operation is appended when its parameter is
-    first used. ``names`` maps names in C to those of the spec."""
+    """Indices of the operations that read parameters, by the names of the parameters in C. An operation is appended
+    when its parameter is first used.
+
+    ``names`` maps names in C to names in the spec.
+    """
 
     def __init__(self, listing: Listing, names: Mapping[str, str]) -> None:
         self._listing, self._names = listing, names
@@ -82,7 +85,9 @@ class _Parameters(dict[str, int]):
 
 
 class _Gauge(dict[int, int]):
-    """Indices of operations that read multiples of Casimirs, by number; an operation is appended on first use."""
+    """Indices of the operations that read multiples of Casimirs, by the number of the Casimir. An operation is appended
+    when it is first used.
+    """
 
     def __init__(self, listing: Listing) -> None:
         self._listing = listing
@@ -92,8 +97,8 @@ class _Gauge(dict[int, int]):
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the operations that compute the coefficients of a stage or of a row of flows; return their
-    indices.
+    """Append the operations that compute the coefficients of a stage, or those of flows with the same duration, and
+    return the indices of the coefficients.
 
     The coefficients depend on parameters, step size and time.
     """
@@ -117,7 +122,7 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
 def stages_of(
     facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step as lists of operations; ``facts`` are what `read` returns for the C of the
+    """Return the stages of a step as lists of operations; ``facts`` is what `read` returns for the C of the
     solver.
 
     Taylor series of paths have the number of terms that the C may use for states in the box ``centre`` or, with
@@ -137,7 +142,8 @@ def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stages of a step by splitting: one, or three if the inverse corrector and the corrector enclose it.
+    """Return the stages of a step by splitting: one or, with a corrector, three (inverse corrector, step,
+    corrector).
 
     In a stage, the flows add their changes to a sum that begins with the compensation term.
     """
@@ -242,8 +248,8 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
     ]
 
 
-#: Safety factor for sizes of terms, when the number of terms of a Taylor series is chosen: the boxes of unknowns that
-#: are found later may be wider.
+#: Safety factor for the sizes of terms that determine the number of terms of a Taylor series. These sizes are computed
+#: for a first box of unknowns, and the final box may be wider.
 MARGIN = 4.0
 
 
@@ -263,8 +269,8 @@ def _path(
 
 
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
-    """Append the Taylor series of the path ṁ = π(m)p from x with p = u; return the terms of each coordinate from order
-    1 on.
+    """Append the Taylor series of the path ṁ = π(m)p from x with p = ``u``. Return the terms for each coordinate, from
+    order 1 on.
     """
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
     outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
@@ -274,9 +280,9 @@ def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: 
 def _along_path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, max_terms: int, coordinate: int
 ) -> Stage:
-    """Return stage k of a step along paths, whose Taylor series have ``least`` to ``max_terms`` terms.
+    """Return stage ``k`` of a step along paths, whose Taylor series have ``least`` to ``max_terms`` terms.
 
-    The series of ``coordinate`` has a term so large that the C cannot end it before ``least`` terms.
+    The series of coordinate number ``coordinate`` has a large term, so that the C cannot end it before ``least`` terms.
     """
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
@@ -330,9 +336,10 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append operations for the thresholds below which the C neglects terms of a Taylor series, for some ``orders``.
+    """Append operations that compute thresholds. The C neglects a term of a Taylor series if it is below its
+    threshold.
 
-    Returns pairs of indices: a term, and its threshold.
+    Returns pairs of indices for the given ``orders``: a term, and its threshold.
     """
     starts = [listing.add("abs", i) for i in x]
     least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
@@ -345,9 +352,10 @@ def _measured(
 
 
 def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence[Any]) -> tuple[int, int, int]:
-    """Return the least and the largest number of terms of Taylor series of paths from a box of states.
+    """Return the least and the largest number of terms that the C uses in Taylor series of paths from a box of
+    states.
 
-    The third result is the number of a coordinate whose series cannot end before the least number.
+    The third result is the index of a coordinate. Its series cannot end before the least number of terms.
     """
     listing = Listing()
     x = listing.inputs("x", n)
