@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Functions that certificates do not cover, by name; each with the motion whose exact flow contains it, as error
-#: messages name the motion.
+#: Functions of exact flows that certificates do not cover. Each function name maps to the motion that contains the
+#: function, in the words of error messages.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
@@ -48,8 +48,8 @@ def problem_of(
 ) -> StepProblem:
     """Return the problem to be certified for the C ``text`` of a solver.
 
-    The solver subtracts multiples of Casimirs from H, the gauge; the problem contains those that it chooses for the
-    state ``start``. Raises `SpecError` for solvers that certificates do not cover.
+    The solver subtracts multiples of Casimirs (the gauge) from H. The problem contains the multiples that the solver
+    chooses for the state ``start``. Raises `SpecError` for solvers that certificates do not cover.
     """
     program, spec = compilation.program, compilation.spec
     _expect_covered(program, spec)

@@ -205,8 +205,8 @@ def _ends(x: Any) -> list[float]:
 def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
     """Return the proof data for the states in X and times in T, for each stage of the step.
 
-    For implicit stages these are a box for the unknowns, bounds for the distance of iterates from the solution and, if
-    the stage follows paths, a box for the paths.
+    The data of an implicit stage are a box for the unknowns and bounds for the distance of iterates from the solution.
+    If the stage follows paths, a box for the paths is added.
     """
     parts, image = list[dict[str, Any]](), X
     for stage in c["stages"]:

@@ -125,8 +125,8 @@ def stages_of(
     """Return the stages of a step as lists of operations; ``facts`` is what `read` returns for the C of the
     solver.
 
-    Taylor series of paths have the number of terms that the C may use for states in the box ``centre`` or, with
-    ``exact``, the largest number that the C allows.
+    If ``exact``, Taylor series of paths have the largest number of terms that the C allows. Otherwise they have the
+    number of terms that the C may use for states in the box ``centre``.
     """
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":

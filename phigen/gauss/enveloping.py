@@ -171,7 +171,7 @@ def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) ->
     """
     m = len(ad)
     flat = fmpq_mat(m * m, m, [ad[a][i, p] for i in range(m) for p in range(m) for a in range(m)])
-    # This is the matrix of Σ κ^ab ad_a ⊗ ad_b, with pairs (i, p) as rows and (j, q) as columns; κ is the Killing form.
+    # The matrix of Σ κ^ab ad_a ⊗ ad_b with the Killing form κ. Rows are pairs (i, p), and columns are pairs (j, q).
     crossed = flat * form.inv() * flat.transpose()
     pairs = [(i, j) for i in range(m) for j in range(i + 1)]
     half = _number((eigenvalue - 2) / 2)

@@ -210,9 +210,10 @@ def _start_of(group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
 
 
 def _element_at(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the components of a group element G = 1 + w, or F + w with a frame F, as functions of the unknowns w.
+    """Return the components of a group element, as functions of the unknowns w: G = 1 + w, or F + w with a
+    frame F.
 
-    Components in the square-zero ideal of the group have no unknowns, and are those of 1.
+    Components in the square-zero ideal of the group have no unknowns; they are those of the element 1.
     """
     offsets = offset_element(group, offsets_of(points, places))
     return [w + start for w, start in zip(offsets, _start_of(group, places), strict=True)]

@@ -254,8 +254,8 @@ def _extrapolation(
 ) -> list[list[Fraction]]:
     """Return the weights W with which Σ_j W[i][j]·f(known_times[j]) predicts f(times[i]).
 
-    It is the best linear prediction of a signal whose spectrum is flat up to the angular frequency ``band`` and 0
-    beyond, from known values with errors of relative size ``noise``.
+    This prediction is the best linear one for signals with a spectrum that is flat up to the angular frequency ``band``
+    and 0 beyond. Known values have errors of relative size ``noise``.
     """
     rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known_times] for a in known_times]
     sides = [[_sinc(band * (a - b)) for b in times] for a in known_times]

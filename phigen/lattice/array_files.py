@@ -42,10 +42,10 @@ class NumberTable:
 
 
 def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return the array in a ``.npy`` or ``.csv`` file, which must have the shape ``shape``.
+    """Return the array in a ``.npy`` or ``.csv`` file.
 
-    A table of one column may have the ``name`` of the field or parameter as the column name. Raises `ValueError` for
-    other contents.
+    A ``.csv`` table of one column may have a column name: ``name``, that of the field or parameter. Raises `ValueError`
+    if the array does not have the given ``shape``, and for other contents.
     """
     if path.suffix == ".npy":
         return _array(path, shape)
@@ -60,11 +60,10 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 
 
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
-    """Return the bonds in a ``.csv`` file: an array (bonds, 2) of the sites that they connect, and the columns of
-    parameters by name.
+    """Return the bonds in a ``.csv`` file, and the columns of parameters by name.
 
-    ``parameters`` are the names that the file may have as columns. Without column names, the file has two columns of
-    sites.
+    The bonds are an array of shape (bonds, 2); each row has the two sites that a bond connects. ``parameters`` are the
+    names that the file may have as columns. Without column names, the file has two columns of sites.
     """
     table = _table(path)
     names = table.names or ENDS

@@ -46,10 +46,9 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 class SumFactors:
     """The common factor of all forces of bonds or pairs on one field.
 
-    It is a product of powers of parameters at sites, of those parameters that may be 0. The factor is divided out of
-    the sums over bonds and pairs, and the sums are multiplied by it afterwards. ``at_site`` is the factor at the site
-    of the sum. ``at_end`` maps the symbols of the parameters at the end of a bond, such as ``m[a]``, to their exponents
-    in the factor.
+    It is a product of powers of parameters that have a value at every site and may be 0. The sums over bonds and pairs
+    are computed without the factor, and then multiplied by ``at_site``, the factor at the site of the sum. ``at_end``
+    maps the symbols of the parameters at the end of a bond, such as ``m[a]``, to their exponents in the factor.
     """
 
     at_site: Expression = ONE

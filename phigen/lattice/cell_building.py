@@ -15,8 +15,8 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size in a run that does not fit the colours of sites: it is not a multiple of their period along the
-    axis.
+    """A size in a run that does not fit the colours of sites: it is not a multiple of the period of the
+    colours.
 
     ``fitting`` is a multiple of the period near ``size``.
     """
@@ -173,8 +173,8 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     """Yield an error for forces and noise that a spec with brackets along bonds cannot have.
 
-    With brackets along bonds, πp at a site is a sum over bonds for every covector field p. phigen does not compute this
-    sum for forces and noise.
+    With brackets along bonds, the motion πp that a force p causes at a site is a sum over bonds. phigen does not
+    compute this sum for covector forces, damping and noise.
     """
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():

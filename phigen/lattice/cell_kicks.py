@@ -1,8 +1,8 @@
 """Search for the potential V of a Nyström method among two parts V and T of H on a lattice.
 
 On grids, the flow of the modified potential V + κ{V, {V, T}} is computed too; see `phigen.splitting.kicks`. The bracket
-of two sums over sites is again a sum over sites s: {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d), where the inner sum
-runs over the brackets of fields f and g at the distance d.
+of two sums over sites is again a sum over sites s. A pair of fields f and g with brackets at the distance d contributes
+the term ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d) to {F, G}.
 """
 
 from __future__ import annotations

@@ -63,8 +63,8 @@ def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFl
     """Return the flows of πζ, with the covector force ζ, which includes damping.
 
     If πζ has an elementary flow, there is this single flow. Otherwise there is one flow for each component of ζ. If a
-    component has no elementary flow, damping gets flows of its own (`phigen.lattice.damping`), and the other forces in
-    ζ are divided into flows in the same way.
+    component has no elementary flow, damping gets flows of its own (`phigen.lattice.damping`). The other forces in ζ
+    then have one flow together or, if that is not elementary, one flow for each component.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
@@ -194,9 +194,9 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
 def noise_statements(cell: Cell) -> Iterator[Statement]:
     """Yield statements on noise: whether the sources commute, and which density is stationary.
 
-    If noise, damping and brackets at a site read no neighbours, and there are no forces except damping, the statements
-    are decided at one site, with symbols for the gradient of H. Otherwise they are decided on a small periodic box or a
-    small graph.
+    The statements are decided at one site, with symbols for the gradient of H, if two conditions hold: noise, damping
+    and brackets at a site read no neighbours, and there are no forces except damping. Otherwise they are decided on a
+    small periodic box or a small graph.
     """
     if not cell.noise:
         return

@@ -1,13 +1,13 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
 The copies of a term on two bonds may not commute if the bonds share a site. The sites are then coloured at run time,
-when the bonds are known, so that no bond connects two sites of one colour. The part that belongs to a colour is the sum
-of the terms over the bonds that begin at sites of this colour or, for some terms, over the bonds that end at these
-sites. A step applies the flows of all colours one after the other.
+when the bonds are known. No bond connects two sites of one colour. A part contains the terms of one colour: each term
+is summed over the bonds that begin at sites of the colour or, for some terms, over the bonds that end there. A step
+applies the flows of all colours one after the other.
 
 Two terms may be mirror images under the exchange of the ends a and b, such as x[a]*y[b] and y[a]*x[b] in a cross
-product. Such terms form one part: one term is summed over the bonds that begin at sites of the colour, and its mirror
-image over the bonds that end there, so that they commute.
+product. Two such terms are in one part: one is summed over the bonds that begin at sites of the colour, and the other
+over the bonds that end there. Then the two sums commute.
 """
 
 from __future__ import annotations
@@ -76,10 +76,9 @@ class GraphSearch(PartSearch):
         return []
 
     def _end_of(self, term: Summand) -> int:
-        """Return the class of a term of a bond: whether it is summed over the bonds that begin, or that end, at sites
-        of the colour of the part.
+        """Return the class of a term of a bond: `BEGINS` or `ENDS_THERE`.
 
-        If two terms are mirror images under the exchange of the ends, they get different classes.
+        Two terms that are mirror images under the exchange of the ends get different classes.
         """
         places = self.cell.places(term.expression).values()
         fields_at = {end: sorted(f for f, o in places if o == (end,) and f in self.cell.fields) for end in ENDS}

@@ -106,10 +106,11 @@ def invariants(cell: Cell) -> Iterator[Statement]:
 
 
 def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
-    """Return the discrete Euler operator of a density: the derivatives of Σ density over all sites with respect to the
+    """Return the discrete Euler operator of a density: the derivatives of the sum over all sites with respect to the
     symbols of one site.
 
-    All are 0 if and only if the density is a constant plus a difference of densities of neighbouring sites.
+    All derivatives are 0 if and only if the density is a constant plus a difference of densities of neighbouring sites.
+    Then the sum telescopes.
     """
     slopes_by_symbol: dict[str, list[Expression]] = {n: [] for n in cell.neighbours.names}
     places = cell.places(density)
@@ -168,7 +169,7 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
     """Yield the residuals of the Jacobi identity for triples of coordinates, one residual for each triple up to
     translation.
 
-    The terms of a residual are collected from all ordered pairs of coordinates, so it is twice the cyclic sum.
+    The terms of a residual are collected from all ordered pairs of coordinates. So a residual is twice the cyclic sum.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
     for f, bracket_partners in partners.items():

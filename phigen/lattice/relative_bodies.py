@@ -159,8 +159,8 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
     """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    In democratic heliocentric coordinates, sweeps with sums over pairs also get the sums Σ m_j V_j/m_0, the velocity
-    that the flow of B adds to all positions.
+    In democratic heliocentric coordinates, the flow of B adds the velocity Σ m_j V_j/m_0 to all positions. There,
+    sweeps with sums over pairs also compute this sum.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 

@@ -139,8 +139,8 @@ class _Reader:
     def _sites(self, bonds: Bonds) -> int:
         """Return the number of sites of a run that does not state ``sizes``.
 
-        It is the length of the longest list in the initial state. If a bond ends at a site beyond this length, the
-        number is that of the last such site, plus 1, since sites are counted from 0.
+        It is the length of the longest list in the initial state. If bonds end at sites with larger numbers, it is the
+        largest of their numbers plus 1, since sites are counted from 0.
         """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):

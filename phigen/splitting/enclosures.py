@@ -1,5 +1,5 @@
-"""Check of matrix exponentials in floating-point arithmetic: their errors must be those of rounding. Ball arithmetic
-gives rigorous bounds.
+"""Check of matrix exponentials in floating-point arithmetic: ball arithmetic bounds their errors, which rounding must
+explain.
 """
 
 from __future__ import annotations

@@ -106,9 +106,9 @@ class NoFlowError(Exception):
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
     """Return the flow of a sum of commuting terms, by the simplest method that gives all flows.
 
-    These methods are tried in order: closed forms; if ``numeric``, matrix exponentials that are computed before the
-    steps; and, if ``numeric``, exponentials of small matrices that depend on the state. Raises `NoFlowError` for the
-    first term without a flow.
+    Closed forms are tried first. If ``numeric``, two methods follow: matrix exponentials that are computed before the
+    steps, then exponentials of small matrices that depend on the state. Raises `NoFlowError` for the first term without
+    a flow.
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:

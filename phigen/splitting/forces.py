@@ -72,8 +72,8 @@ def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
 def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
     """Return the flows of πζ, where ζ is the covector force including damping.
 
-    There is one flow for the whole field; if that fails, a flow for each component of ζ; if that fails too, flows of
-    the damping and of all other components.
+    The first of these choices that phigen can solve is used: one flow for the whole field; one flow for each component
+    of ζ; flows of the damping, and flows of all other covector forces.
     """
     try:
         covectors = list(_covectors(system, forces.covector))
@@ -125,7 +125,7 @@ def _merged_flows(flows: Sequence[Flow]) -> Flow:
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
     """Yield the flows of the damping field λππb, where b is the part of ∇H in a block of π.
 
-    b is divided into as few summands as possible, such that each has a flow.
+    b is the sum of as few terms as possible such that the field of each term has a flow.
     """
     slopes = gradient(system.hamiltonian, system.coordinates)
     ring = ring_of(system, slopes)

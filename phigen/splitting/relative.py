@@ -72,8 +72,9 @@ class RelativeMotions:
 
     ``hamiltonian`` is A in Cartesian coordinates. ``kepler`` has the Kepler motions; their positions Q_i and momenta
     P_i are linear forms. ``total_momentum`` and ``inverse_mass`` are those of the centre of mass. ``spread`` maps each
-    Cartesian coordinate to its change, as a linear form of symbols for the changes of the Q_i, of the P_i and of the
-    centre of mass. ``masses`` has pairs for proofs: a mass m_i or a sum M_i, and the expression that replaces it.
+    Cartesian coordinate to its change in the flow. This change is a linear form in symbols for the changes of the Q_i,
+    the P_i and the centre of mass. ``masses`` has pairs for proofs: a mass m_i or a sum M_i, and the expression that
+    replaces it.
     """
 
     hamiltonian: Expression
@@ -111,9 +112,8 @@ class RelativeMotions:
         """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
         motion.
 
-        The first expressions vanish if ``spread`` is the inverse of the linear forms Q_i and P_i: it turns changes of
-        Q_i and P_i into changes of Cartesian coordinates, and the forms must turn these back. The other expressions are
-        the identities of Kepler motions.
+        ``spread`` converts changes of Q_i and P_i to changes of Cartesian coordinates. The first expressions vanish if
+        the linear forms Q_i and P_i convert these back. The other expressions are the identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)

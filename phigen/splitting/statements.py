@@ -82,8 +82,8 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
 
 
 def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield the statement {V, {V, {V, T}}} = 0 for H = T + V and, for modified kicks, that V + κ{V, {V, T}} is their
-    Hamiltonian.
+    """Yield the statement {V, {V, {V, T}}} = 0 for H = T + V. For a modified kick, also yield that its Hamiltonian is V
+    + κ{V, {V, T}}.
 
     ``plain`` are the Hamiltonians of the two parts at κ = 0.
     """
@@ -163,8 +163,8 @@ def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
 def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for a flow that is composed of pieces.
 
-    All expressions vanish under four conditions: each piece is an exact flow, the Hamiltonians of the pieces sum to
-    that of the flow, the pieces commute, and the increments are those of their composition.
+    All expressions vanish under four conditions. Each piece is an exact flow. The Hamiltonians of the pieces sum to the
+    Hamiltonian of the flow. The pieces commute. The increments are those of the composition of the pieces.
     """
     part_flows = flow.pieces
     for part_flow in part_flows:
@@ -181,8 +181,8 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
 def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the flow of Kepler motions or of a rigid body.
 
-    All expressions vanish under three conditions: π∇H is the vector field of the motion, the increments are those of
-    its formula, and the identities hold that prove this formula.
+    All expressions vanish under three conditions. π∇H is the vector field of the motion. The increments are given by
+    the known formula for this motion. The identities hold by which the formula is proved.
     """
     names = system.coordinates
     field = flow.vector_field(system)
