@@ -59,8 +59,9 @@ class StarAlgebra:
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return x̃(a), the value of the functional x̃ of a point x, as a linear form in x: it maps k to the
-        coefficient of x_k.
+        """Return x̃(a), the value of the functional x̃ of a point x.
+
+        This value is a linear form in x: the result maps k to the coefficient of x_k.
         """
         return combined(self.functional, a)
 

@@ -1,4 +1,5 @@
-"""Cancellation of parameters at sites that may be 0, such as the masses of test particles.
+"""Cancellation of parameters that have a value at every site and may be 0, such as the masses of test
+particles.
 
 A factor m of H and a factor 1/m of a bracket are cancelled, so that the equations of motion are defined at m = 0.
 """
@@ -22,8 +23,8 @@ def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expres
 
 
 def divided(e: Expression, exponents: Mapping[str, int]) -> Expression:
-    """Return the expression ``e`` divided by the product of the symbols raised to ``exponents``, with powers
-    cancelled.
+    """Return ``e`` divided by powers of symbols, in a form without common factors. ``exponents`` has the exponents by
+    symbol.
     """
     return cancelled([mul(e, powers({name: -k for name, k in exponents.items()}))], exponents)[0]
 

@@ -1,4 +1,4 @@
-"""Construction of the `Cell` of a spec with ``lattice:``, with all checks on the spec."""
+"""Construction of the `Cell` from a spec with the key ``lattice``. All checks on such a spec are made here."""
 
 from __future__ import annotations
 
@@ -86,7 +86,8 @@ def cell_from_spec(spec: Spec) -> Cell:
 def least_sizes(cell: Cell) -> tuple[int, ...]:
     """Return the least number of sites along each axis of a grid.
 
-    With these numbers no site is its own neighbour, and each term of H, π and the observables fits between open ends.
+    On a grid of these sizes no site is its own neighbour, and each term of H, π and the observables fits between open
+    ends.
     """
     reaches = zip(cell.hamiltonian_reach, cell.poisson_reach, cell.observed_reach, strict=True)
     return tuple(1 + max(reach) for reach in reaches)

@@ -84,7 +84,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
-    """Return the energy, at the initial state of a run, of the part of H whose flow is ``flow``."""
+    """Return the energy of a part of H at the initial state of a run; ``flow`` is the flow of this part."""
     import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of

@@ -65,7 +65,7 @@ def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequenc
 
 
 def motion_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
-    """Yield residuals, labelled by field, that vanish if and only if the increments of a motion solve ẋ = ``rates``."""
+    """Yield (field, residual). All residuals vanish if and only if the increments of a motion solve ẋ = ``rates``."""
     names, increments = list(motion.solution), list(motion.solution.values())
     start = substitute(increments, {TIME: ZERO})
     speeds = derivatives(increments, TIME)

@@ -216,7 +216,7 @@ def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expr
 
 
 def energies(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over the bonds or pairs of a site whose summand is the energy of a bond or pair.
+    """Return sums over the bonds or pairs of a site. The summand is the energy of the bond or pair.
 
     For bonds there may be two sums: over the bonds that begin at the site, and over those that end there.
     """

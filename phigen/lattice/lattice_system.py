@@ -17,7 +17,7 @@ class LatticeSystem:
     """A lattice of any size: ``spec`` is the content of the spec file, and ``cell`` holds the fields, brackets and
     densities of one site.
 
-    `phigen.compile` accepts it as it accepts a `System`.
+    `phigen.compile` accepts a `LatticeSystem` in place of a `System`.
     """
 
     spec: Spec = field(repr=False)

@@ -1,7 +1,7 @@
 """Recognition of lattices among ordinary systems whose specs list the coordinates of all sites.
 
 Numbers in names of coordinates are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. Each term of H is
-translated to the site at the origin. Terms that are equal after translation, one for every site, become a term of the
+translated to the site at the origin. Terms that are equal after translation, one for every site, become one term of the
 density of H. Brackets are treated in the same way. Terms are compared only by their values at one point, so the result
 may be wrong. Therefore the lattice is expanded, and the expansion is proved to be the original system.
 """

@@ -6,7 +6,7 @@ and a velocity V_i, which is its relative momentum divided by its reduced mass. 
 m_i, and then have a limit at m_i = 0: a body without mass is attracted by others, but attracts none. The parts have
 these flows:
 
-- A moves Q_i and V_i along a conic section with the strength γ M_i, and the centre of mass uniformly;
+- A moves Q_i and V_i along a conic section, as the attraction of a mass M_i does, and the centre of mass uniformly;
 - B changes V_i by the attraction of the other bodies.
 
 In Jacobi coordinates, M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all other bodies. The acceleration

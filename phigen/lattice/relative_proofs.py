@@ -109,9 +109,9 @@ class _FewBodies:
     def product(self, positions: str, velocities: str) -> Expression:
         """Return the difference of two sums, which is 0 if the change of coordinates is canonical.
 
-        The first sum is Σ m_i q_i·v_i, in Cartesian coordinates. The second is M R·V + Σ Q_i·V_i/w_i, in relative
-        coordinates. Here R is the centre of mass, V its velocity, M the total mass, and 1/w_i are reduced masses.
-        ``positions`` and ``velocities`` are the kinds (see `names`) of the symbols for Q and V.
+        The first sum is Σ m_i q_i·v_i, in Cartesian coordinates. The second is M R·V + Σ Q_i·V_i/w_i, with relative
+        positions Q_i, relative velocities V_i and reduced masses 1/w_i. R is the centre of mass, V its velocity, and M
+        the total mass. ``positions`` and ``velocities`` are the kinds (see `names`) of the symbols for Q_i and V_i.
         """
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]

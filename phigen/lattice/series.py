@@ -101,7 +101,7 @@ class SeriesPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """Return the words in the header of generated files that say how forces act.
+        """Return a text for the header of generated files that says how forces act.
 
         Covector forces ζ are added to ∇H; vector forces f act in two halves.
         """

@@ -84,8 +84,8 @@ class Colouring:
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """Return, for each axis, the number of which the size must be a multiple. With seams all sizes are allowed, and
-        the number is 1.
+        """Return one number for each axis. The size along the axis must be a multiple of this number. With seams all
+        numbers are 1, so that all sizes are allowed.
         """
         if self.seams:
             return (1,) * len(boundary)

@@ -136,8 +136,8 @@ class SplittingPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """Return "": in a splitting, forces have flows of their own, so that the header of generated files needs no
-        words on them.
+        """Return "": forces have flows of their own in a splitting, so the header of generated files needs no text
+        about them.
         """
         return ""
 
@@ -479,8 +479,8 @@ def _gather(
 ) -> Gather | None:
     """Return the kernels that compute sums over bonds or pairs, or None if ``sums`` is empty.
 
-    All elements of ``sums`` have the same symbols. For instance, one element is for the bonds at whose end a a site
-    lies, and one for the bonds at whose end b it lies.
+    All elements of ``sums`` have the same symbols. There are two elements if a bond contributes differently to its
+    first and to its second end.
     """
     if not sums:
         return None

@@ -37,9 +37,9 @@ def varied_sum(name: Symbol) -> Symbol:
 
 
 def with_variations(cell: Cell, values: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return summands of sums over bonds or pairs, followed by summands for the variations of the sums.
+    """Return ``values`` together with the summands for the variations of the sums.
 
-    ``values`` maps the symbol of each sum to its summand, and so does the result.
+    ``values`` maps the symbol of each sum over bonds or pairs to its summand. The result is a map of the same form.
     """
     names = [n for n in values if isinstance(n, Symbol) and kind_of(n) == GATHERED]
     assert len(names) == len(values)

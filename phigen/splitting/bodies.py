@@ -120,7 +120,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
 
 
 def _distance(ring: Ring, generator: Generator) -> _Distance | None:
-    """Return the distance of two bodies whose inverse is a variable of the ring, given by its ``generator``.
+    """Return the distance of two bodies if its inverse is the variable ``generator`` of the ring.
 
     Returns None if the argument of the root is not a sum of squares of differences of two coordinates.
     """
@@ -139,9 +139,9 @@ def _distance(ring: Ring, generator: Generator) -> _Distance | None:
 
 
 def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
-    """Return for each axis the indices of the coordinates along it, in order.
+    """Return one list for each axis: the indices of the coordinates along this axis, in ascending order.
 
-    ``pairs`` are pairs of coordinates whose difference occurs in H; such coordinates lie along one axis.
+    ``pairs`` are pairs of coordinates whose difference occurs in H; two such coordinates lie along one axis.
     """
     axes: list[set[int]] = []
     for pair in pairs:
@@ -165,7 +165,9 @@ def _commuting_terms(
 
 
 def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
-    """Return the flow composed with the flow of the sum of ``terms``, which commute with its Hamiltonian."""
+    """Return the composition of ``flow`` and of the flow of the sum of ``terms``; all ``terms`` commute with its
+    Hamiltonian.
+    """
     return composed(ring.coordinates, [flow, _flow(ring, terms)]) if terms else flow
 
 

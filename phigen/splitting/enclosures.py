@@ -1,5 +1,5 @@
-"""Check of matrix exponentials in floating-point arithmetic: ball arithmetic bounds their errors, which rounding must
-explain.
+"""Check that rounding explains the errors of matrix exponentials in floating-point arithmetic. Ball arithmetic bounds
+the errors.
 """
 
 from __future__ import annotations

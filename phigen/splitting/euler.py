@@ -8,9 +8,9 @@ the flow. Then the addition theorem of Jacobi's functions gives the state x' aft
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
 
 where σ_i > 0, except that σ_i = C for the smallest E_i. An error of κ changes only the time over which the body moves;
-energy and |x| stay constant. No phase is stored between steps, and no formula divides by the difference of two moments
-of inertia. So the separatrix, rotations about an axis and symmetric bodies are not special cases. Near the separatrix,
-R is as accurate as those x_i that are small there.
+energy and Casimirs stay constant. No phase is stored between steps, and no formula divides by the difference of two
+moments of inertia. So the separatrix, rotations about an axis and symmetric bodies are not special cases. Near the
+separatrix, R is as accurate as those x_i that are small there.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -227,7 +227,8 @@ def identities() -> Iterator[tuple[str, Expression]]:
 def _function_identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the functions S(κ), C(κ) and D of this module.
 
-    All expressions vanish if dκ/dt = (1 + z)D/4 with z = Pκ² implies dS/dt = CD.
+    All expressions vanish if the motion of κ gives the motion of S: dκ/dt = (1 + z)D/4 with z = Pκ² must lead to dS/dt
+    = CD.
     """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)

@@ -8,8 +8,9 @@ times a factor. It is tangent to the symplectic leaves, so each summand of πζ 
 
 Damping is ζ = λπb with b = ∇H. If its flow is not known, each block of π has flows of its own, from the components of b
 in the block. If these components together have no flow, they are divided into two summands: the terms that do not
-depend on the coordinates of the block, and all other terms. If the other terms have no flow either, each component has
-its own summand. Finally, flows are combined into one part if none of them changes a coordinate that another one reads.
+depend on the coordinates of the block, and all other terms. If the other terms have no flow either, each of their
+components is a summand. Finally, flows are combined into one part if none of them changes a coordinate that another one
+reads.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ _DAMPING_HINT = (
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
-    """Return the flows of the forces of a system, as parts of a splitting; empty without forces.
+    """Return the flows of the forces of a system, as parts of a splitting; () without forces.
 
-    Raises `SpecError`, naming a summand that has no flow.
+    Raises `SpecError` if a summand of the forces has no flow; the error names the summand.
     """
     if system.forces is None:
         return ()
@@ -125,7 +126,7 @@ def _merged_flows(flows: Sequence[Flow]) -> Flow:
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
     """Yield the flows of the damping field λππb, where b is the part of ∇H in a block of π.
 
-    b is the sum of as few terms as possible such that the field of each term has a flow.
+    b is written as a sum of as few terms as possible, such that the damping field of each term has a flow.
     """
     slopes = gradient(system.hamiltonian, system.coordinates)
     ring = ring_of(system, slopes)

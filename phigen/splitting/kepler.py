@@ -148,10 +148,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols C, S, r0, η, β, w, k and one component of q
     and p.
 
-    All expressions vanish if the increments are the flow. They are residuals of three equations: the equations of
-    motion of q and p, in which r stands for |q'|, and r² = |q'|². Time derivatives follow from ds = dt/r: dS/dt =
-    C/(2r) and dC/dt = −βS/(2r). The square |v|² is written as 2wk/r0 − β. The relation C² + βS² = 1 is substituted as β
-    = (1 − C²)/S².
+    All expressions vanish if the increments are the flow. The expressions are residuals of three equations: the
+    equations of motion of q and p, in which r stands for |q'|, and r² = |q'|². Time derivatives follow from ds = dt/r:
+    dS/dt = C/(2r) and dC/dt = −βS/(2r). The square |v|² is written as 2wk/r0 − β. The relation C² + βS² = 1 is
+    substituted as β = (1 − C²)/S².
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)

@@ -42,7 +42,10 @@ class Kick:
 
 
 def kicks(system: System, splitting: SplitHamiltonian) -> tuple[Kick, ...]:
-    """Return the parts V of H = T + V for which {V, {V, {V, T}}} = 0 is proved; none unless H has exactly two parts."""
+    """Return the parts V of H = T + V for which {V, {V, {V, T}}} = 0 is proved.
+
+    If the number of parts of H is not 2, the result is ().
+    """
     if len(splitting.flows) != 2:
         return ()
     ring = ring_of(system, hamiltonian_terms(system), [KICK])
@@ -118,7 +121,7 @@ def degree(ring: Ring, element: Poly, coordinates: Sequence[int]) -> float:
 
 
 def _bracket(ring: Ring, f: Poly, g: Poly) -> Poly:
-    """Return {f, g} = ∇f·π∇g, without a test whether it is zero, which may be slow."""
+    """Return {f, g} = ∇f·π∇g. The bracket is not tested for being 0, since this test may be slow."""
     field = ring.field(g)
     slopes = {j: ring.tower.derivative(f, ring.coordinates[j]) for j in ring.support(f)}
     return ring.tower.combine(field[j] * slope for j, slope in slopes.items())

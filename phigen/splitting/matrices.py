@@ -67,8 +67,8 @@ class MatrixExponential:
             columns = wider
 
     def slopes(self) -> dict[str, Expression]:
-        """Return the time derivatives of the entries of exp(tA) − 1, by the symbol of the entry. They are the entries
-        of A exp(tA).
+        """Return the time derivatives of the entries of exp(tA) − 1, by the symbol of the entry. The matrix of these
+        derivatives is A exp(tA).
         """
         n, entries = self.size, self.symbols
         rates: dict[str, Expression] = {}

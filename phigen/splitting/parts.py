@@ -154,7 +154,8 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """Yield lists of terms with multiples of companions subtracted, where this reduces the number of parts.
+    """Yield lists of terms after multiples of companions have been subtracted, if this reduces the number of
+    parts.
 
     Companions are Casimirs and similar functions; see `phigen.splitting.regrouping`.
     """

@@ -60,7 +60,7 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
     """Yield functions C whose multiples may be subtracted from terms: Casimirs of π, and quadratic Casimirs of
     sub-brackets.
 
-    Each two terms that do not commute define a sub-bracket: the brackets within the smallest set of coordinates that
+    Any two terms that do not commute define a sub-bracket: the brackets within the smallest set of coordinates that
     contains the coordinates of both terms and is closed under brackets.
     """
     ring, candidates = conflicts.ring, list(system.casimirs.values())

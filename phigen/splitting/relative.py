@@ -2,8 +2,8 @@
 coordinates.
 
 Bodies 0, …, N have masses m_i, positions q_i and momenta p_i, and k_ij is the strength of the attraction −k_ij/|q_i −
-q_j|. Let M_i = m_0 + … + m_i, and M be the total mass. The part A of H is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1
-and of |p_0 + … + p_N|²/2M, the motion of the centre of mass. The part B is H − A.
+q_j|. Let M_i = m_0 + … + m_i, and M be the total mass. The part A of H is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥
+1, plus the energy |p_0 + … + p_N|²/2M of the centre of mass. The part B is H − A.
 
 - *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with w_i =
   M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. A contains the whole kinetic energy.
