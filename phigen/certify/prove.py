@@ -158,8 +158,11 @@ class _Search:
     divided: list[int]  # depth of each box that was divided
 
     def tree(self, domain: Box, depth: int = 0) -> dict[str, Any]:
-        """Return the proof for a box or, if that fails, the proofs for its two halves, as a tree. Raises
-        `RefusedError`."""
+        """Return the proof for a box as a tree. If no proof for the whole box is found, the tree has proofs for its two
+        halves.
+
+        Raises `RefusedError` if no proof is found.
+        """
         c = self.certificate
         *X, T = [interval(d) for d in domain]
         try:

@@ -22,7 +22,7 @@ _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
 #: Pattern of Python's keywords, which are identifiers in C.
 _KEYWORDS = rf"\b({'|'.join(keyword.kwlist)})\b"
 
-#: Suffix of Python's keywords while C is parsed as Python. Names in generated C end in ASCII characters.
+#: Suffix that Python's keywords get while C is parsed as Python. No name in generated C ends in this character.
 _SUFFIX = "π"
 
 #: Statement of splittings with `adjoint: true`: it copies the state, and changes nothing that a step computes.

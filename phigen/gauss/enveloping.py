@@ -322,8 +322,7 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by all basis elements of the star algebra A = K ⊕ g ⊕ S ⊕
-        Z.
+        """Return the matrices of left multiplication by all basis elements of the star algebra K ⊕ g ⊕ S ⊕ Z.
 
         ``left`` has the matrices for the basis elements of g. Elements of S and Z are combinations of products of
         elements of g. Returns None if these products do not span S.

@@ -131,7 +131,9 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
 
 
 def _normalised(a: Map) -> Map:
-    """Return the multiple of a linear map whose first entry is 1. Products with it need fewer multiplications."""
+    """Return a linear map, multiplied such that its first entry is 1. Products with the result need fewer
+    multiplications.
+    """
     first = a[min(a)]
     return {position: v / first for position, v in a.items()}
 
@@ -146,10 +148,11 @@ def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], S
 def _assembled(
     ad: Sequence[Sequence[Vector]], form: Mapping[tuple[int, int], Map], scalars: Sequence[Map], field: Field
 ) -> StarAlgebra:
-    """Return the star algebra K ⊕ g of a Lie algebra g, where K is the commutative algebra with the basis ``scalars``.
+    """Return the star algebra K ⊕ g of a Lie algebra g, where K is the commutative algebra with the basis
+    ``scalars``.
 
-    Its basis has the elements of K, then 2e for each basis element e of g. The products are 2a·2b = 4β(a, b) + 2[a, b]
-    with the ``form`` β. The caller checks the axioms.
+    The basis of the star algebra has the elements of K, then 2e for each basis element e of g. The products are 2a·2b =
+    4β(a, b) + 2[a, b] with the ``form`` β. The caller checks the axioms.
     """
     m, count, unit = len(ad), len(scalars), field.one
     span, twice_unit, one_half = Span(field, scalars), field.number(2), unit / field.number(2)
@@ -196,9 +199,9 @@ def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
 
 
 def _idempotent(algebra: StarAlgebra) -> Vector | None:
-    """Return an idempotent other than 0 and 1 of the commutative part, span(1, k), of a star algebra.
+    """Return an idempotent, other than 0 and 1, in the commutative part span(1, k) of a star algebra.
 
-    If k² = p + qk and r² = p + q²/4, it is (1 + (k − q/2)/r)/2. Returns None if r is not rational.
+    If k² = p + qk and r² = p + q²/4, the idempotent is (1 + (k − q/2)/r)/2. Returns None if r is not rational.
     """
     field = algebra.field
     if not field.is_rational:

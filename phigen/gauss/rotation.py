@@ -55,8 +55,8 @@ def _element(
 def _images(group: AlgebraBlock, attitude: Group) -> list[Dual] | None:
     """Return the image of each basis element of the star algebra under a homomorphism to dual quaternions.
 
-    It maps rotations and translations of the attitude as the head of the module says. Returns None if there is no such
-    homomorphism.
+    The head of the module says how the homomorphism maps rotations and translations of the attitude. Returns None if
+    there is no such homomorphism.
     """
     algebra, field = group.algebra, group.algebra.field
     half = field.one / field.number(2)

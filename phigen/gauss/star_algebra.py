@@ -25,10 +25,10 @@ class StarAlgebra:
     """Star algebra in a basis.
 
     ``table[i, j]`` is the product of the basis elements i and j; products that are 0 have no entry. ``star[i]`` is the
-    image of a basis element under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a that
-    span the Lie algebra g. ``frame`` has skew elements by which momenta are computed: E_a = Σ_k
-    combination[a][k]·frame[k]. A point x of the phase space defines the functional x̃ on the algebra; its value at
-    basis element i is Σ_a functional[i][a]·x_a.
+    image of basis element i under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a that
+    span the Lie algebra g. ``frame`` has skew elements f_k by which momenta are computed: E_a = Σ_k combination[a][k]
+    f_k. A point x of the phase space defines the functional x̃ on the algebra. The value of x̃ at basis element i is
+    Σ_a functional[i][a] x_a.
     """
 
     field: Field

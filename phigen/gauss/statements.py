@@ -129,8 +129,8 @@ def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], E
 
 
 def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
-    """Decide whether coordinates with the brackets of a Lie algebra are a quadratic momentum map on its star
-    algebra.
+    """Decide whether coordinates with the brackets of a Lie algebra are a quadratic momentum map on the star algebra of
+    the group.
     """
     coordinate_names = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra
@@ -153,7 +153,8 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
 
 
 def _functionals(system: System, points: StageMap) -> Statement:
-    """Decide whether functionals λ as unknowns, in place of some components of group elements, give the same step.
+    """Decide whether a step is the same if functionals λ take the place of some components of group elements as
+    unknowns.
 
     The changes of coordinates and the velocities must be equal. Symbols stand for ∇H, so that the statement holds for
     any H.

@@ -19,11 +19,11 @@ from phigen.symbolic.tower import Tower
 
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
-    """Return the parts V of H = T + V that can be the potential of a Nyström method: those with {V, {V, {V,
-    T}}} = 0.
+    """Return the parts V of H = T + V that can be the potential of a Nyström method.
 
-    The condition is proved by polynomial degrees. Splittings into another number of parts, or with colours, have no
-    such part. On a grid, each result also has the flow of the modified potential V + κ{V, {V, T}}.
+    The method requires {V, {V, {V, T}}} = 0, which is proved by polynomial degrees. Splittings into another number of
+    parts, or with colours, have no such part. On a grid, each result also has the flow of the modified potential V +
+    κ{V, {V, T}}.
     """
     coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
     if len(splitting.flows) != 2 or coloured or cell.bond_bracket:

@@ -227,8 +227,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
 def _function_identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the functions S(κ), C(κ) and D of this module.
 
-    All expressions vanish if the motion of κ gives the motion of S: dκ/dt = (1 + z)D/4 with z = Pκ² must lead to dS/dt
-    = CD.
+    All expressions vanish if S satisfies dS/dt = CD. This must follow from dκ/dt = (1 + z)D/4 with z = Pκ².
     """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
