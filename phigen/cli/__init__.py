@@ -1,7 +1,6 @@
-"""The command line of phigen; each command has a module, which is imported when the command is used.
+"""The command line of phigen. Each command has a module, which is imported when the command is used.
 
-``phigen --help`` and ``phigen --version`` only import click. Therefore the module of a command imports the compiler
-inside its functions.
+The module of a command imports the compiler inside its functions, so that the help of the command appears at once.
 """
 
 from __future__ import annotations
@@ -41,8 +40,8 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """Group of commands. The module of a command is imported when the command is used; its exceptions become messages
-    and exit codes.
+    """Group of the commands. It imports the module of a command when the command is used, and turns exceptions into
+    messages and exit codes.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -71,7 +70,7 @@ class Commands(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
-    def main(  # type: ignore[override]  # click's overloads tell only that standalone mode does not return
+    def main(  # type: ignore[override]  # by click's overloads, only standalone mode does not return
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,
@@ -81,8 +80,8 @@ class Commands(click.Group):
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         if isinstance(sys.stdout, TextIOWrapper):
-            # Characters that the terminal cannot show are written as escapes, as Python does on stderr; by default,
-            # printing them would raise an exception.
+            # By default, printing a character that the terminal cannot show raises an exception. Here such a character
+            # is written as an escape, as Python does on stderr.
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
             interrupts.working = True
@@ -103,9 +102,9 @@ class Commands(click.Group):
             with console.heeding(), console.watching():
                 return super().invoke(ctx)
         except (BrokenPipeError, EOFError) as error:
-            # These exceptions are reported here. click would exit with code 1 for a broken pipe, but 1 means a wrong
-            # spec; and it would take an EOFError for ^D at a prompt. A real ^D does not arrive here, since the prompts
-            # of click raise Abort.
+            # click would report these two exceptions wrongly. A broken pipe would end with exit code 1, which means a
+            # wrong spec. An EOFError would count as ^D at a prompt. A real ^D does not arrive here, since prompts of
+            # click raise Abort.
             return failures.report(error, console)
 
 

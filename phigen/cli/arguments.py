@@ -82,7 +82,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
         if Path(value).suffix.lower() not in suffixes:
             raise click.BadParameter(f"{value!r} must end in {_one_of(suffixes)}")
         if Path(value).suffix.lower() == ".zarr" and Path(value).is_dir():
-            expect_writable(Path(value) / "zarr")  # an existing store is a folder, in which files are written
+            expect_writable(Path(value) / "zarr")  # an existing store is a folder; files are written in it
         else:
             expect_writable(Path(value))
             expect_replaceable(Path(value))

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.spec.model import Spec
 
-#: Further compiler flags of ``--compile``, which turn warnings into errors: generated C compiles without warnings.
+#: Compiler flags that ``--compile`` adds. They turn warnings into errors, since generated C must compile without
+#: warnings.
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
 
@@ -157,7 +158,7 @@ def _to_build(
     """Return the specs to build.
 
     Specs found in a searched folder are left out if ``left_out.txt`` in the output folder has their names. Specs that
-    the user names are always built. With --check, raises CheckError if the list has names that no spec has.
+    the user names are always built. With --check, raises CheckError if ``left_out.txt`` has names that no spec has.
     """
     folders = [file for file in spec_files if Path(spec_path(file)).is_dir()]
     left_out = names_left_out(directory) if folders else {}
@@ -199,9 +200,9 @@ def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], opt
 
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
-    """Raise CheckError with a list of the files that differ from those that ``command`` would write.
+    """Raise CheckError with a list of the files that the command line ``command`` would change.
 
-    Does nothing if no file differs. With ``diff``, the differences are printed first.
+    Does nothing if no file would change. With ``diff``, the differences are printed first.
     """
     outdated = [change for change in planned if change.state != "unchanged"]
     if diff:
@@ -257,8 +258,8 @@ def _write(
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify the written solvers, and write a certificate for each system that meets all bounds.
 
-    The certificate of an earlier build is removed first. A system that misses a bound gets no certificate. The errors
-    of all these systems are raised together at the end.
+    The certificate of an earlier build is removed first. A system that misses a bound gets no certificate. After all
+    systems have been verified, their errors are raised together.
     """
     from phigen.cli import certificate
     from phigen.cli.verify import missed_bounds, verified, verified_lattice
@@ -284,7 +285,7 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
 
 
 def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], options: Options) -> None:
-    """Raise CheckError if a certificate on disk belongs to files other than the planned ones.
+    """Raise CheckError if a certificate on disk does not belong to the planned files of its system.
 
     Systems without a certificate on disk pass.
     """

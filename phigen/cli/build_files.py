@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-#: For each build system, the name of its file and the suffix of the sources that it lists.
+#: For each build system, the name of its file, and the suffix of the sources that the file lists.
 FILES = {"cmake": ("CMakeLists.txt", ".c"), "meson": ("meson.build", ".c"), "python": ("__init__.py", ".py")}
 
 
 def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> dict[str, str]:
-    """Return the texts of the files (name → text) for build systems; a file without sources is empty.
+    """Return the files for build systems (name → text).
 
-    ``solvers`` maps the name of each solver in the folder to its files.
+    ``solvers`` maps the name of each solver in the folder to its files. A file for a build system lists those files of
+    the solvers that have the suffix of its sources. It may list none.
     """
     return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
 
 
 def sources_lack(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> list[str]:
-    """Return the build systems for which no solver has sources."""
+    """Return the build systems whose file would list no sources."""
     endings = {Path(file).suffix for files in solvers.values() for file in files}
     return [system for system in sorted(systems) if FILES[system][1] not in endings]
 

@@ -26,8 +26,8 @@ def path_of(folder: Path, name: str) -> Path:
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
     """Return the part of a certificate that identifies the build for which it is valid.
 
-    It has the version of phigen, the name of the system, the hash of the spec, and for each file the checksum of the
-    text below its header.
+    This part has the version of phigen, the name of the system, the hash of the spec, and a checksum for each file. The
+    checksum is that of the text below the header of the file.
     """
     return {
         "phigen": __version__,
@@ -49,7 +49,10 @@ def text_of(compilation: Compilation, files: Mapping[str, str], verification: Ve
 
 
 def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> str:
-    """Return why a certificate on disk does not belong to these files; "" if it does, or if there is none."""
+    """Return the reason why a certificate on disk does not belong to these files.
+
+    The reason is "" if the certificate belongs to these files, or if there is no certificate.
+    """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

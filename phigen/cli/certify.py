@@ -101,11 +101,11 @@ def command(
 ) -> None:
     """Prove a bound for the distance between a step of the generated C and the exact Poisson map.
 
-    The bound holds for all steps that begin in a box of states, for C of profile small. Ball arithmetic proves it. The
-    bound covers the rounding of every operation, the stopping criterion of Newton's method, and the errors of libm. For
-    an implicit step, the proof shows that its equation has exactly one solution near the computed one. DIR/NAME
-    receives the C, the certificate NAME.bounds.json, and a checker that verifies the certificate without phigen. Exit
-    code 5 if there is no certificate for the box; the message says what to try.
+    The bound holds for all steps that begin in a box of states, for C of profile small. It is proved by ball
+    arithmetic. It covers the rounding of every operation, the stopping criterion of Newton's method, and the errors of
+    libm. For an implicit step, the proof shows that its equation has exactly one solution near the computed one.
+    DIR/NAME receives the C, the certificate NAME.bounds.json, and a checker that verifies the certificate without
+    phigen. Exit code 5 if there is no certificate for the box; the message says what to try.
     """
     from phigen.certify.checker import RefusedError
     from phigen.certify.problem import problem_of
@@ -148,7 +148,8 @@ def command(
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
     """Return the interval of each coordinate.
 
-    The interval comes from ``--box``, else from ``box:`` of the run; else it is centred at the initial value.
+    The interval is the one in ``--box`` or, if this option does not name the coordinate, the one in ``box:`` of the
+    run. The default is an interval around the initial value.
     """
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
@@ -165,9 +166,10 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 
 
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
-    """Return the interval of times for which the bound holds: from ``--time``, else the times of the run.
+    """Return the interval of times for which the bound holds.
 
-    If H does not depend on the time, the interval consists of the start of the run alone.
+    The interval is the one in ``--time``, by default from the start to the end of the run. If H does not depend on the
+    time, the interval consists of the start of the run alone.
     """
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")
@@ -191,7 +193,8 @@ def _range(text: str, option: str) -> list[float]:
 def _observed(
     certificate: dict[str, Any], exact: dict[str, Any], files: dict[str, str], samples: int, console: Console
 ) -> list[float]:
-    """Return for each coordinate the largest distance between sampled steps of the compiled C and the exact map.
+    """Compare sampled steps of the compiled C with the exact map; return the largest distance for each
+    coordinate.
 
     The list is empty without samples or without a C compiler. Raises `CheckError` if a distance exceeds its bound.
     """

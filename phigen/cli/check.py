@@ -60,11 +60,11 @@ def command(
 ) -> None:
     """Prove the mathematics of specs, or refute it.
 
-    The statements: π is skew and satisfies the Jacobi identity; Casimirs and invariants are conserved; α and β
-    satisfy the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting
-    solves its equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points.
-    Exit code 5 if any statement is refuted. With -q only statements that do not hold are printed; with -v all triples
-    that fail the Jacobi identity.
+    The statements: π is skew and satisfies the Jacobi identity; Casimirs and invariants are conserved; α and β satisfy
+    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting solves its
+    equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points. Exit code 5
+    if any statement is refuted. With -q only statements that do not hold are printed. With -v all triples of
+    coordinates that violate the Jacobi identity are printed.
 
     With --independent sympy derives the S_i a second time, by another method, and checks α and β. Results are printed
     term by term. Exit code 3 if the time limit is reached.
@@ -103,7 +103,7 @@ def _compared(
     *,
     shown: bool,
 ) -> list[Agreement]:
-    """Compare S_i, α and β of the compilation with those that sympy derives, and return the comparisons.
+    """Compare the S_i, α and β of a compilation with those that sympy derives. Return the comparisons.
 
     If ``shown``, each comparison is printed as soon as it is complete. Refutations go to the collector.
     """
@@ -152,7 +152,7 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
 
 
 def _say_unexamined(collector: Collector, console: Console) -> None:
-    """Report the specs with errors, about which nothing was proved."""
+    """Report each spec that has errors: nothing was proved about it."""
     places = [d.location for e in collector.errors if isinstance(e, SpecError) for d in e.diagnostics]
     for file in dict.fromkeys(place.file for place in places if place):
         console.note(f"{file}: nothing was proved, because the spec has errors")

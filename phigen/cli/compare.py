@@ -55,8 +55,8 @@ def command(
     """Compare bi-realisations, schemes and classical methods on a run of a spec.
 
     The table lists steps, CPU time, the errors of energy and Casimirs, the distance from the solution, and the Poisson
-    defect: the largest entry of DΦ π DΦᵀ − π∘Φ with the exact derivative DΦ of a step. Methods that do not apply to
-    the system are left out.
+    defect. For a step Φ with the exact derivative DΦ, this defect is the largest entry of DΦ π DΦᵀ − π∘Φ. Methods that
+    do not apply to the system are left out.
     """
     from phigen.compiler import compile_proved
     from phigen.runtime.origin import origin_of

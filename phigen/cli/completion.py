@@ -13,9 +13,10 @@ from phigen.errors import PhigenError
 
 
 def specs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[CompletionItem[str]]:
-    """Return matching names of bundled specs and spec files and folders in the working directory.
+    """Return the names that begin with the prefix: spec files and folders in the working directory, then
+    bundled specs.
 
-    If none match, the shell completes file names.
+    If no bundled spec matches, the shell completes file names instead.
     """
     bundled = bundled_names(ctx, parameter, prefix)
     if not bundled:
@@ -32,9 +33,13 @@ def bundled_names(ctx: click.Context, parameter: click.Parameter, prefix: str) -
 
 
 def runs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
-    """Return the names of runs of the specs on the command line; specs with errors are ignored."""
+    """Return the names of runs that begin with the prefix. The runs are those of the specs on the command line.
+
+    Specs with errors are ignored.
+    """
     run_names: list[str] = []
-    # When click completes an option, it has not yet assigned the other words of the command line to parameters.
+    # While click completes an option, the other words of the command line are not assigned to parameters yet. So each
+    # of these words may be a spec.
     for source in ctx.args:
         try:
             run_names += load_one(source).runs

@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass
 class Console:
-    """Messages of one command; data goes to stdout by `out`, `out_json` and `out_document`."""
+    """Messages of one command, on stderr. Data goes to stdout, by `out`, `out_json` and `out_document`."""
 
     quiet: bool = False
     verbose: bool = False
@@ -32,7 +32,7 @@ class Console:
         self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
 
     def _write_line(self, message: str) -> None:
-        # suppressed, since errors of writing to stderr can be reported nowhere
+        # An error of writing to stderr is suppressed, since there is no other place for its message.
         with self._display.room(), suppress(OSError):
             click.echo(message, err=True, color=_colour())
 
@@ -41,7 +41,7 @@ class Console:
         self._write_line(_coloured(message))
 
     def warn(self, message: str) -> None:
-        """Print a warning, after which work continues."""
+        """Print a warning, unless -q was given. The command continues afterwards."""
         if not self.quiet:
             self._write_line(_coloured(f"warning: {message}"))
 
@@ -57,7 +57,7 @@ class Console:
 
     @contextmanager
     def heeding(self) -> Iterator[None]:
-        """Context in which warnings that phigen raises as a Python library are printed like warnings of commands."""
+        """Context in which warnings of phigen's Python functions are printed like the warnings of commands."""
         with warnings.catch_warnings():
             library_function = warnings.showwarning
 
@@ -83,8 +83,8 @@ class Console:
     def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
         """Context with a progress bar on stderr.
 
-        The value of the context is a function, to be called with the number of steps done so far. It is None if stderr
-        is no terminal, or with -q.
+        The value of the context is a function. The caller passes the number of steps done so far to this function. If
+        stderr is no terminal, or with -q, there is no progress bar, and the value is None.
         """
         if self.quiet or not sys.stderr.isatty():
             yield None
@@ -124,7 +124,7 @@ def verbosity(command: F) -> F:
 
 
 def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
-    """Return the rows as lines with aligned columns; the columns with indices in ``right`` are aligned at the right."""
+    """Return the rows as lines with aligned columns. Columns with an index in ``right`` are aligned at the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
@@ -134,7 +134,7 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[s
 
 
 def indented(lines: Sequence[str]) -> list[str]:
-    """Return the lines with an indent of two spaces, like that of the second and later lines of a message."""
+    """Return the lines with an indent of two spaces, as in the second and later lines of a message."""
     return [f"  {line}" for line in lines]
 
 
@@ -174,7 +174,7 @@ def out_document(text: str) -> None:
 
 @contextmanager
 def _stdout() -> Iterator[None]:
-    """Context in which an error of writing becomes an error that names stdout as the file."""
+    """Context in which an error of writing has stdout as the name of the file. A broken pipe is not changed."""
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
     try:
@@ -186,9 +186,9 @@ def _stdout() -> Iterator[None]:
 
 
 def _colour() -> bool | None:
-    """Whether to use colour: False if NO_COLOR is set (https://no-color.org), else None.
+    """Return False if NO_COLOR is set (https://no-color.org), which means no colour, else None.
 
-    None means that click decides: it uses colour on terminals only.
+    For None, click decides: it uses colour on terminals only.
     """
     return False if os.environ.get("NO_COLOR") else None
 

@@ -1,4 +1,4 @@
-"""``phigen demo``: the Lotka–Volterra system of the paper, integrated up to just before its singularity."""
+"""``phigen demo``: the Lotka–Volterra system of the paper (arXiv:2303.15883), until shortly before its singularity."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ _ROWS_AT = (0.1, 0.2, 0.24, 0.25, 0.254, 0.255)
 @verbosity
 @pass_console
 def command(console: Console, target: str) -> None:
-    """Compile the paper's Lotka–Volterra system, run it up to just before its singularity, and compare.
+    """Compile the paper's Lotka–Volterra system, run it until shortly before its singularity, and print its
+    errors.
 
-    The solution has a closed form and becomes infinite in finite time. The table compares phigen's solvers and RK2, all
-    with the same step: their distance from the closed form, and their error of the Casimir.
+    The solution has a closed form and becomes infinite in finite time. The table compares two solvers of phigen with
+    RK2, with the same step. It lists their distances from the closed form, and their errors of the Casimir.
     """
     import numpy as np
 
@@ -49,7 +50,7 @@ def command(console: Console, target: str) -> None:
     for order in ORDERS:
         compilation = compilation_of(source, order=order)
         solver = loaded(compilation, target, console)
-        target = solver.target  # after a fallback from C to NumPy, later solvers are NumPy too, without another report
+        target = solver.target  # so that a fallback from C to NumPy is reported only once
         run = experiment.run
         trajectory = solver.integrate(experiment.initial, experiment.h, run.steps, run.stride)
         solutions[f"phigen {order}"] = trajectory.x
@@ -83,7 +84,10 @@ def _print(
 
 
 def singularity(experiment: Experiment) -> float:
-    """Return the time at which x1 becomes infinite: x1' = x1 (E − x1), where E = x1 + x2 + x3 is constant."""
+    """Return the time at which x1 becomes infinite.
+
+    The sum E = x1 + x2 + x3 is constant, so x1 satisfies x1' = x1 (E − x1).
+    """
     total, first = sum(experiment.initial), experiment.initial[0]
     return math.log((total - first) / -first) / total
 

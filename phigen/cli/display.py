@@ -1,4 +1,6 @@
-"""Display of the compiler's stages on stderr: one changing line on a terminal, and with -v a line for each stage."""
+"""Display of the compiler's stages on stderr. On a terminal, one line shows the active stages; with -v, each stage has
+a line.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ DELAY, PERIOD = 1.0, 0.2
 class Display:
     """Status line of the active stages of the compiler.
 
-    ``shows`` returns whether the line is drawn; ``began`` is called with the name of each stage that starts.
+    The line is drawn if ``shows`` returns true. When a stage starts, ``began`` is called with its name.
     """
 
     def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:

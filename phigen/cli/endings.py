@@ -1,4 +1,4 @@
-"""Ends of runs and times of stored states, from the keys or options steps, until, stop, every and stride."""
+"""The end of a run and the times of its stored states, as keys of the run or options of the command define them."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ AnySolver = Solver | LatticeSolver
 
 
 def ended(experiment: E, solver: AnySolver, console: Console) -> E:
-    """Return the experiment with its end, as the keys ``until`` and ``stop`` of the run define it.
+    """Return the experiment with its end, if the run has the key ``until`` or ``stop``.
 
-    ``until`` is a time; ``stop`` is an expression, at whose first zero the run ends. The field ``end`` and the number
-    of steps are set. Runs without these keys are returned unchanged.
+    ``until`` is a time. ``stop`` is an expression, and the run ends at the first zero of this expression. The field
+    ``end`` and the number of steps are set. Runs without these keys are returned unchanged.
     """
     run, h = experiment.run, experiment.h
     end: End | None = None
@@ -48,7 +48,7 @@ def ended(experiment: E, solver: AnySolver, console: Console) -> E:
 
 
 def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: End | None) -> End | None:
-    """Return the end of the run at the first zero of ``stop``; None if the run ends before that zero."""
+    """Return the end of the run at the first zero of ``stop``; None if the run ends before the first zero."""
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
     g = experiment.function(run.stop, solver)
@@ -67,7 +67,7 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
 
 
 def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
-    """Return the number of steps up to an end, with the fraction of the last step. Raises `BackendError`."""
+    """Return the number of steps up to an end; a shorter last step counts as a fraction. Raises `BackendError`."""
     if not end.part:
         return float(end.steps)
     session = experiment.begun(solver)
@@ -76,9 +76,9 @@ def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
 
 
 def length(experiment: Experiment, solver: AnySolver) -> float:
-    """Return the length of a run up to its end, in the time t.
+    """Return the length of a run up to its end, in the time t or, with a monitor, in the rescaled time τ.
 
-    With a monitor g, the length is that in the rescaled time τ, for which dt = g dτ. Raises `StepError`.
+    Raises `StepError`.
     """
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
@@ -91,15 +91,15 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
 def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequence[str] = ()) -> E:
     """Return the experiment with the times at which states are stored.
 
-    The times have the equal distances ``every``, or are listed in ``at``. Each text in ``at`` contains times, or is the
-    path of a file that contains times. Without these options, the keys of the run apply.
+    These times have the distance ``every``, or they are listed in ``at``. Each entry of ``at`` is a text with times, or
+    the path of a file with times. Without these arguments, the keys of the run apply.
     """
     if every is None and not at and experiment.run.every is not None:
         every = float(experiment.run.every)
     time_list = _parse_times(at) if at else [float(t) for t in experiment.run.at] if every is None else []
     if every is None and not time_list:
         return experiment
-    # with a monitor, the steps are not equal in t, so the time of the end is known only after the steps were made
+    # With a monitor, steps are not equal in t, so the steps must be made before the time of the end is known.
     if experiment.end is None and solver.interface.monitored:
         end_time = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=end_time)
@@ -114,8 +114,8 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequ
 def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
     """Return the listed times in order, without the start and without times outside the run.
 
-    Raises `click.BadParameter` for times outside the run if they come from the command line (``asked``). The option may
-    list times after a zero of ``stop``, which ended the run early; they are left out as well.
+    If the times come from the command line (``asked``), times outside the run raise `click.BadParameter`. But if
+    ``stop`` has ended the run early, times after its end are only left out.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     too_late = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
@@ -148,7 +148,7 @@ def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[fl
 def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[float], option: str) -> None:
     """Raise `click.BadParameter` if the system has noise and a time lies inside a step.
 
-    The path of a system with noise is known only after whole steps.
+    With noise, states are known only after whole steps.
     """
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h

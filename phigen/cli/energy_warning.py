@@ -14,16 +14,16 @@ from phigen.tuning.equal_work import rk4_energy_error
 from phigen.tuning.problem import Problem
 from phigen.tuning.search import rounded_down
 
-#: Energy error that the proposed step should have. With this error, orbits keep their shape.
+#: A warning proposes a step with about this energy error. With an error this small, orbits keep their shape.
 TARGET_ENERGY_ERROR = 1e-3
 
 #: Runs with smaller energy errors than this are not compared with RK4, since their orbits keep their shape.
 LEAST_COMPARED_ERROR = 1e-3
-#: Runs with more steps than this are not compared with RK4: the comparison would take long. Besides, the energy error
-#: of RK4 grows with time, so RK4 is seldom better in long runs.
+#: Runs with more steps than this are not compared with RK4, because the comparison would take long. In long runs RK4 is
+#: seldom better anyway, since its energy error grows with time.
 MOST_STEPS = 1_000_000
-#: The warning appears if the error of RK4 is smaller by more than this factor. A smaller advantage may be an accident,
-#: since measured times vary.
+#: The warning about RK4 appears if its error is smaller by more than this factor. A smaller advantage may be an
+#: accident, since measured times vary.
 LEAST_RK4_ADVANTAGE = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
@@ -32,9 +32,9 @@ _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the st
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
     """Return the warning about the energy error of a run of an ordinary system; "" if no warning is necessary.
 
-    If forces act or H depends on the time, the error is that of the energy balance, H minus the work done. There is no
-    warning if the integral for the work is too inaccurate. This is the case if its estimated error is not small
-    compared with the energy error, or is so large that the estimate itself means nothing.
+    If forces act or H depends on the time, the error is that of the energy balance: H minus the work done. The work is
+    an integral, whose error is estimated. If this estimate is not small compared with the energy error, or is large
+    itself, there is no warning.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < min(energy.error / 2, LARGE_ENERGY_ERROR)

@@ -19,8 +19,8 @@ def _keep(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     ctx.meta[_FORCE] = value
 
 
-#: The option ``--force``. click reads it before the options that name files, since the checks of these files depend on
-#: it.
+#: The option ``--force``. click reads it before the options that name files. So the checks of these files know whether
+#: it was given.
 force_option = click.option(
     "--force",
     is_flag=True,
@@ -34,7 +34,7 @@ force_option = click.option(
 def expect_replaceable(path: Path, option: str | None = None) -> None:
     """Raise `click.BadParameter` for an existing file that phigen did not write, unless ``--force`` was given.
 
-    A file that may be replaced is noted, so that the command can say which files it replaced.
+    The path of a file that may be replaced is stored, so that the command can report the replacement.
     """
     if not path.is_file() or path.stat().st_size == 0:
         return
@@ -64,9 +64,9 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
         if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):
             continue
         if path.with_name(f"{path.name}.checkpoint").exists() or (path.is_file() and path.stat().st_size == 0):
-            continue  # an empty file, or a file of an interrupted run, whose checkpoint states the origin
+            continue  # the file is empty, or a checkpoint beside it states its origin
         if path.is_dir() and not is_store(path):
-            continue  # a folder that is not a Zarr store is refused elsewhere, even with --force
+            continue  # another check refuses a folder that is no Zarr store
         file_origin = read_origin(path)
         hint = "" if continued else "; --force replaces it"
         if file_origin is None and not continued:
@@ -91,7 +91,7 @@ def wrote(path: Path) -> str:
 def _is_of_phigen(path: Path) -> bool:
     """Whether phigen seems to have written a file.
 
-    A table must have the column t. A file of any other kind must contain the word phigen.
+    A ``.csv`` or ``.npz`` file must have the column t. Any other file must contain the word phigen.
     """
     match path.suffix.lower():
         case ".csv":

@@ -1,4 +1,4 @@
-"""A run of a spec, changed by options of the command line, and the solver for it."""
+"""A run of a spec with the changes from the command line, and the solver of the spec."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 class Experiment:
     """Run of a spec, changed by options of the command line.
 
-    ``end`` is set if the run ends at a time or at a zero of an expression, possibly by a partial last step. ``times``
-    are the times of stored states, which replace the stride; the first and the last state are stored too. ``past`` has
-    the rows of a finished run that this run continues (`phigen.cli.past.StoredRows`). ``first`` is the attitude at the
-    start, if it is not the identity.
+    ``end`` is set if the run ends at a given time or at a zero of an expression; then the last step may be shorter than
+    the others. ``times`` are the times of stored states, which replace the stride. The first and the last state are
+    stored too. ``past`` has the rows of a finished run that this run continues (`phigen.cli.past.StoredRows`).
+    ``first`` is the attitude at the start; None stands for the identity.
     """
 
     run: Run
@@ -60,15 +60,17 @@ class Experiment:
 
     @property
     def made(self) -> int:
-        """Number of steps of the finished run ``past``; a partial last step counts as a whole one.
+        """Number of steps of the finished run ``past``; a shorter last step counts as a whole one.
 
-        A run with noise has used up the random numbers of this number of steps.
+        For a system with noise, this is also the number of steps whose random numbers have been used.
         """
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
     def begun(self, solver: Any) -> Any:
-        """Return a session of the solver, at the state from which its steps start. Raises `StepError`."""
+        """Return a session of the solver, at the state from which the steps of this experiment start. Raises
+        `StepError`.
+        """
         from phigen.cli.past import begun
 
         return begun(solver, self)
@@ -108,7 +110,7 @@ class Experiment:
 
 
 def expect_system(spec: Spec) -> None:
-    """Raise `SpecError` for lattices; the hint says how to expand one."""
+    """Raise `SpecError` for lattices. The hint says how to expand a lattice to an ordinary spec."""
     if spec.lattice:
         from phigen.geometry.system import system_of_lattice
 
@@ -116,7 +118,7 @@ def expect_system(spec: Spec) -> None:
 
 
 def run_of(spec: Spec, name: str | None) -> Run:
-    """Return the run of that name, by default the first. Raises `SpecError` if there is no run."""
+    """Return the run called ``name``, by default the first run. Raises `SpecError` if the spec has no runs."""
     if not spec.runs:
         hint = "add one under runs:, with initial, step and steps; phigen new shows how"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
@@ -134,9 +136,9 @@ def prepared(
     settings: Iterable[str] = (),
     until: float | None = None,
 ) -> Experiment:
-    """Return the run of that name, by default the first, with the options of the command line; lattices are refused.
+    """Return the run called ``name``, by default the first run, with the options of the command line.
 
-    ``settings`` are texts NAME=VALUE of initial values and parameters.
+    ``settings`` are texts NAME=VALUE of initial values and parameters. Raises `SpecError` for lattices.
     """
     expect_system(spec)
     run = changed(spec, name, step, steps, until)
@@ -156,7 +158,7 @@ def changed(
     steps: int | None = None,
     until: float | None = None,
 ) -> Run:
-    """Return the run of that name, by default the first, with step and end from the command line."""
+    """Return the run called ``name``, by default the first run, with the step and the end from the command line."""
     run = run_of(spec, name)
     if until is not None:
         run = replace(run, duration=None)
@@ -212,7 +214,7 @@ def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
 
 
 def with_stop(spec: Spec, run: Run, text: str | None) -> Run:
-    """Return the run that stops at a zero of the expression of ``--stop``."""
+    """Return the run, changed so that it stops at a zero of the expression in ``--stop``."""
     from phigen.spec.stops import stop_of
 
     if text is None:
@@ -236,7 +238,7 @@ def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
 
 
 def setting_of(setting: str) -> tuple[str, float]:
-    """Return name and number of a text NAME=VALUE."""
+    """Return the name and the number in a text NAME=VALUE."""
     name, equals, text = (part.strip() for part in setting.partition("="))
     try:
         value = float(Fraction(text)) if "/" in text else float(text)

@@ -87,7 +87,7 @@ def report(error: BaseException, console: Console) -> int:
 def drop_unprinted() -> None:
     """Discard output that stdout and stderr did not accept.
 
-    The failure was reported already; Python would report it again at exit, with exit code 120.
+    The failure was reported already. Otherwise Python would report it again at exit, and end with exit code 120.
     """
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -99,7 +99,10 @@ def drop_unprinted() -> None:
 
 
 def _place(error: OSError) -> str:
-    """Return the file that an OSError names, or the working directory if that was removed; else ""."""
+    """Return the name of the file in an OSError.
+
+    If there is no name, the result is "the working directory" if this folder was removed, else "".
+    """
     if error.filename is not None:
         return os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
     try:
@@ -110,9 +113,10 @@ def _place(error: OSError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C caused the exception, and its message says nothing more.
+    """Whether Ctrl-C caused the exception, so that the message is only "interrupted".
 
-    Libraries may convert an interrupt to an error of their own, for instance in an import.
+    Libraries may convert an interrupt to an error of their own, for instance during an import. An `InterruptedRunError`
+    does not count, since it has a message of its own.
     """
     while error is not None and not isinstance(error, InterruptedRunError):
         if isinstance(error, KeyboardInterrupt):
@@ -123,7 +127,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 def _described(error: PhigenError) -> str:
     text = str(error)
-    # Messages about specs contain "error:" after the location already.
+    # Messages about specs already contain "error:", after the location.
     return text if isinstance(error, SpecError) or ": error:" in text.split("\n")[0] else f"error: {text}"
 
 

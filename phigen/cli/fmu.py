@@ -23,13 +23,14 @@ PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _M
 
 
 def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, MockupUnit]:
-    """Return the FMU of each system by name.
+    """Return the FMU (functional mock-up unit) of each system, by the name of the system.
 
     Raises `SpecError` with a list of the systems for which no FMU can be made.
     """
     from phigen.fmu.archive import unit_of
 
-    # --stack measures the stack of the C alone, without the functions of FMI, so an FMU does not state it.
+    # --stack measures the stack of the C alone. An FMU also contains the functions of FMI, so it does not state this
+    # size.
     collector, units, of_c = Collector(), {}, replace(options, single_file=False, stack=None)
     for compilation in compilations:
         with collector.collecting():

@@ -48,7 +48,7 @@ class Options:
             raise click.UsageError("single precision needs the profile small: leave out --profile fast")
 
     def compiled(self, spec: Spec) -> Compilation:
-        """Return the compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
+        """Compile a spec with these options, and prove its statements; see `phigen.compiler.compile_proved`."""
         from phigen.compiler import compile_proved
 
         compilation = compile_proved(
@@ -66,7 +66,7 @@ class Options:
         return compilation if self.stack is None else self._measured(compilation, self.stack)
 
     def _with_changeable_parameters(self, compilation: Compilation) -> Compilation:
-        """Return the compilation, extended by the function of the C that bindings call to change parameters."""
+        """Return the compilation, with a function in the C that changes parameters. Bindings call this function."""
         spec, part = compilation.spec, "parameters"
         if part in spec.extras.without and spec.parameters and not spec.lattice:
             message = f"--binding {self.bindings[0]} needs {spec.name}_set_parameters, which `without` leaves out"
@@ -75,7 +75,8 @@ class Options:
         return compilation.including(part)
 
     def _measured(self, compilation: Compilation, flags: str) -> Compilation:
-        """Return the compilation with the size of the stack that its C uses, which the header states.
+        """Return the compilation with the size of the stack that its C uses. The header of the C states this
+        size.
 
         gcc measures the size, with the compiler flags ``flags``.
         """
@@ -95,7 +96,7 @@ class Options:
         return self.targets or compilation.spec.targets
 
     def command(self, spec_files: Sequence[str]) -> str:
-        """Return the command line of ``phigen build`` that writes the same files."""
+        """Return the command line of ``phigen build`` for spec files, with these options and this output folder."""
         arguments = ["phigen", "build", *spec_files]
         if str(self.directory) != DIRECTORY:
             arguments += ["-o", str(self.directory)]
@@ -172,8 +173,8 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
-        # For a binding, the C has the function that sets parameters, which the profile would leave out. So the command
-        # names the bindings.
+        # The profile would leave out the function that sets parameters, but bindings need it. So the command names the
+        # bindings.
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     _expect_steps(compilation, target)
@@ -181,9 +182,9 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
 
 
 def _expect_steps(compilation: Compilation, target: str) -> None:
-    """Raise `SpecError` at the key ``coordinates_from`` if the target is ``device``.
+    """Raise `SpecError` if the spec has the key ``coordinates_from`` and the target is ``device``.
 
-    The code for devices cannot make steps in relative coordinates, which this key requests.
+    This key requests steps in relative coordinates, which the code for devices cannot make.
     """
     swept = compilation.program.step.swept
     if target == "device" and swept and swept.relative:

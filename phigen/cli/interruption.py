@@ -21,7 +21,7 @@ class InterruptedRunError(PhigenError):
 
 @dataclass
 class Stop:
-    """Flag that the user or the operating system has requested an end."""
+    """Flag: whether the user or the operating system has requested the end of a run."""
 
     requested: bool = False
 
@@ -31,7 +31,7 @@ def interruptible() -> Iterator[Stop]:
     """Context in which SIGINT and SIGTERM set the flag of a `Stop`; a second signal raises `KeyboardInterrupt`."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
-        yield stop  # other threads do not receive signals
+        yield stop  # Python passes signals to the main thread only
         return
 
     def handle(number: int, frame: FrameType | None) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run
     from phigen.symbolic.expression import Expression
 
-#: Errors that may occur on reading a file that is not the file of a run.
+#: Errors of reading that show that a file does not contain a run.
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile)
 
 
@@ -35,8 +35,8 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZ
 class LatticeExperiment(Experiment):
     """Run of a lattice, changed by options of the command line.
 
-    ``start`` has the initial state and the parameters. ``past`` is a `phigen.runtime.lattice_rows.Past`, the rows of a
-    finished run that this run continues. ``origin`` is the text on provenance that output files contain.
+    ``start`` has the initial state and the parameters. ``past`` has the rows of a finished run that this run continues
+    (`phigen.runtime.lattice_rows.Past`). ``origin`` is a text on provenance for output files.
     """
 
     start: Start | None = None
@@ -48,10 +48,9 @@ class LatticeExperiment(Experiment):
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """Return everything on which the steps depend: initial state, step size, parameters, time and random
-        numbers.
+        """Return the initial state, step size, parameters, time and random numbers of the steps.
 
-        If there is a monitor and the run continues a finished one, this includes the energy level e = −H at the start
+        If the run has a monitor and continues a finished run, the result also has the energy level e = −H at the start
         of the finished run.
         """
         assert self.start is not None
@@ -64,7 +63,7 @@ class LatticeExperiment(Experiment):
         return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws, level=level)
 
     def begun(self, solver: LatticeSolver) -> ObservedCourse:
-        """Return an integration that has not made a step yet. Raises `StepError`."""
+        """Return an integration before its first step. Raises `StepError`."""
         return ObservedCourse.begun(solver, self.beginning(solver))
 
     def function(self, expression: Expression, solver: LatticeSolver) -> Function:
@@ -87,10 +86,11 @@ class LatticeExperiment(Experiment):
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
-    """Return the run and its start, changed so that the run starts at the last state in the file of another run.
+    """Return the run and its start, changed so that the run starts at the last state in the file of another
+    run.
 
-    If H depends on the time, the run also starts at the time of that state. Raises `click.BadParameter` for files of
-    other kinds, and for states of another shape.
+    If H depends on the time, the run also starts at the time of that state. Raises `click.BadParameter` if the file
+    does not contain a run of a lattice, or if its states have another shape.
     """
     try:
         state, t = _last_of(source, solver.interface, start.state.shape)
@@ -105,7 +105,7 @@ def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) ->
 
 
 def _last_of(source: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> tuple[Floats, float]:
-    """Return the last state in a file of a run, and its time."""
+    """Return the last state in the file of a run, and the time of this state."""
     if source.suffix.lower() == ".csv":
         table = _table(source, interface, shape)
         return table.last, float(table.t[-1])
@@ -130,8 +130,8 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
-    # With a monitor, the number of steps does not follow from times, since steps are not equal in t. Then the number in
-    # the file is used, which is 0 for a .csv.
+    # With a monitor, steps are not equal in t, so times do not determine the number of steps. Then the number in the
+    # file is used. It is 0 for a .csv.
     steps = earlier_run.steps if solver.interface.monitored else steps
     return replace(experiment, past=replace(earlier_run, steps=steps))
 

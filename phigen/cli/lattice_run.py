@@ -231,7 +231,7 @@ def _draw(
     plot: Path,
     origin: str,
 ) -> None:
-    """Draw a film or a figure, by the suffix of the file."""
+    """Draw a film or a figure, depending on the suffix of the file."""
     from phigen.runtime.lattice_series import LatticeSeries
 
     title = f"{spec.name}, {run.name}"
@@ -255,7 +255,7 @@ def _draw(
 def exponents_of(
     console: Console, spec: Spec, run: Run, solver: LatticeSolver, start: Start, parameters: Mapping[str, Any]
 ) -> Spectrum:
-    """Return a spectrum that contains only the largest Lyapunov exponent of a run. Raises `StepError`."""
+    """Return the largest Lyapunov exponent of a run, as a spectrum without other exponents. Raises `StepError`."""
     from phigen.study.lyapunov import lattice_spectrum
 
     t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
@@ -266,7 +266,7 @@ def exponents_of(
 
 
 def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str, Any]:
-    """Return the parameters of a run; those given on the command line replace those of the spec."""
+    """Return the parameters of a run. Values from the command line replace those of the spec."""
     parameters: dict[str, Any] = dict(start.parameters)
     for setting in settings:
         name, value = setting_of(setting)
@@ -279,7 +279,10 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
 
 
 def steps_text(trajectory: LatticeTrajectory) -> str:
-    """Return the number of steps in words: "60 steps of 0.1", then "and a part of one" after a shorter last step."""
+    """Return the number of steps in words, such as "60 steps of 0.1".
+
+    With a monitor, "in τ" is added. If the last step is shorter, "and a part of one" is added.
+    """
     whole_time, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
     elapsed = trajectory.t[-1] - trajectory.t[0]
     if monitored:

@@ -37,8 +37,8 @@ _ABOUT = (
 class ManifestEntry:
     """Entry of one vendored solver.
 
-    ``spec_file`` is a path relative to the folder, or the name of a bundled spec; None if the file is in another place.
-    ``files`` maps file names to the sha256 of their bytes.
+    ``spec_file`` is the path of the spec relative to the folder, or the name of a bundled spec. It is None if the path
+    would mean nothing on another machine. ``files`` maps file names to the sha256 of their bytes.
     """
 
     name: str
@@ -85,8 +85,7 @@ def sha256(content: str | bytes) -> str:
 def relative(spec_file: str, folder: Path) -> str | None:
     """Return the path of a spec relative to the folder.
 
-    Returns None if the relative path leads through the root or a home folder, since it would mean nothing on another
-    machine.
+    Returns None if the path leads through the root or a home folder. Such a path would mean nothing on another machine.
     """
     source, target = Path(os.path.abspath(spec_file)), Path(os.path.abspath(folder))  # noqa: PTH100  (resolve() would follow links)
     common = Path(os.path.commonpath([source, target]))
@@ -104,9 +103,9 @@ def text_of(entries: Mapping[str, ManifestEntry], builds: Collection[str] = ()) 
 
 
 def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
-    """Return the entries of a folder's manifest by name, and its build systems; both empty if there is no manifest.
+    """Return the entries of a folder's manifest by name, and its build systems.
 
-    Raises `CheckError` if the manifest is damaged.
+    Without a manifest there are no entries and no build systems. Raises `CheckError` if the manifest is damaged.
     """
     path = folder / FILE
     try:
@@ -133,7 +132,7 @@ def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
     text, spec_file = "\n".join(lines), spec.get("file")
     if sha256(text) != spec["sha256"]:
         raise ValueError(f"{name}: the text of its spec was changed")
-    # Names in the manifest become paths that are written and removed, so they are checked.
+    # Names in the manifest become paths of files that are written or removed, so the names are checked.
     if not re.fullmatch(SPEC_NAME, name) or not (spec_file is None or isinstance(spec_file, str)):
         raise ValueError(f"{name!r} is not the name of a solver, or its spec is not a file")
     files = {str(file): str(digest) for file, digest in part["files"].items()}

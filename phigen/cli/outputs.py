@@ -16,7 +16,7 @@ from phigen.writing import write_all
 
 @dataclass(frozen=True)
 class Change:
-    """Change of one file: its text on disk and its intended text; None stands for a file that is absent."""
+    """Change of one file: its text on disk, and its intended text. None means that the file is absent."""
 
     path: Path
     before: str | None
@@ -24,9 +24,9 @@ class Change:
 
     @property
     def state(self) -> str:
-        """The state of the file on disk: ``unchanged``, ``missing`` or ``different``.
+        """The state of the file on disk: ``unchanged``, ``missing``, ``different`` or ``stale``.
 
-        The state is ``stale`` if no spec of this build produces the file.
+        The file is stale if no spec of this build produces it.
         """
         if self.before == self.after:
             return "unchanged"
@@ -53,8 +53,10 @@ class Change:
 
 
 def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable[str]) -> list[Change]:
-    """Return the changes that building NAME makes in its folder: files to write, and obsolete files of the same
-    targets."""
+    """Return the changes that building NAME makes in its folder: files to write, and obsolete files to remove.
+
+    Only files of the ``targets`` are removed.
+    """
     _expect_own_folder(folder)
     result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
     for suffix in suffixes(targets):
@@ -78,7 +80,7 @@ def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> It
 
 
 def apply(planned: Iterable[Change]) -> None:
-    """Write all files or none, then remove obsolete files; readers never see a partly written file."""
+    """Write all files or none, then remove obsolete files. Other programs never read a partly written file."""
     planned = list(planned)
     write_all({c.path: c.after for c in planned if c.after is not None and c.state != "unchanged"})
     for change in planned:
@@ -87,9 +89,9 @@ def apply(planned: Iterable[Change]) -> None:
 
 
 def read(path: Path) -> str | None:
-    """Return the text of a file, None if it is absent.
+    """Return the text of a file; None if it is absent.
 
-    Bytes that are not UTF-8 are replaced: files of phigen are in UTF-8, and the exact text of other files does not
+    Bytes that are not UTF-8 are replaced. Files of phigen are in UTF-8, and the exact text of other files does not
     matter.
     """
     try:

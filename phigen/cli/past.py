@@ -1,4 +1,4 @@
-"""Runs that start where another run ended: the file of the other run is read, and the steps start at its last state."""
+"""Runs that start at the last state of another run, which is read from the file of that run."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class StoredRows:
 
 
 def columns_of(names: Interface) -> list[Column]:
-    """Return the columns of the rows of a run."""
+    """Return all columns that the file of a run may have."""
     attitude_columns = element_columns(names.attitude, position=names.position)
     return trajectory_columns(
         names.coordinates, names.casimirs, attitude_columns, names.observables, monitored=names.monitored
@@ -54,8 +54,10 @@ def columns_of(names: Interface) -> list[Column]:
 
 
 def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
-    """Return the columns that a run records: times and the columns in ``record``, or all columns if ``record`` is
-    empty."""
+    """Return the columns that a run records: times, and the columns that ``record`` names.
+
+    If ``record`` is empty, all columns are recorded.
+    """
     if not record:
         return columns_of(names)
     attitude_keys = [column.key for column in element_columns(names.attitude, position=names.position)]
@@ -81,7 +83,7 @@ def past_of(path: Path, names: Interface, option: str) -> StoredRows:
 
 
 def _expect_rows(stored_rows: StoredRows, needed_columns: Sequence[str]) -> None:
-    """Raise `ValueError` for rows that cannot be those of a run, and `KeyError` if one of ``needed_columns`` is
+    """Raise `ValueError` for rows that do not come from a run, and `KeyError` if one of ``needed_columns`` is
     absent.
     """
     if (
@@ -135,9 +137,9 @@ def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Ex
 def begun(solver: Solver, experiment: Experiment) -> Session:
     """Return a session of the solver, at the state from which the steps of an experiment start.
 
-    If the experiment continues a finished run, this is the last state of that run. What was fixed at the first state of
-    that run stays fixed: the gauge (the multiples of Casimirs that are subtracted from H), or with a monitor the energy
-    level e = −H.
+    If the experiment continues a finished run, this is the last state of that run. The values that were fixed at the
+    start of that run stay the same: the gauge (the multiples of Casimirs that are subtracted from H) or, with a
+    monitor, the energy level e = −H.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

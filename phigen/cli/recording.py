@@ -47,7 +47,10 @@ _ROWS = 1 << 14
 
 @dataclass(frozen=True)
 class Files:
-    """Files of the rows and of the crossings of a run; None for those that were not requested."""
+    """The files to which a run writes its rows (``output``) and its crossings (``section``).
+
+    A file that was not requested is None.
+    """
 
     output: Path | None = None
     section: Path | None = None
@@ -105,7 +108,7 @@ class Recorder:
             "solver": solver.backend.identity,
         }
         self.session: Session
-        self.number = 0.0  # steps from the first state to the last row, with a fraction after a partial step
+        self.number = 0.0  # number of steps up to the last row, not an integer if this row lies inside a step
         self._whole: int | None = None  # number of whole steps, set when the partial last step has been made
         self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
@@ -148,8 +151,11 @@ class Recorder:
             self._record_past_rows(self.experiment.past.rows)
 
     def resume(self, path: Path) -> None:
-        """Continue from the checkpoint ``path``, with the files in their state at the checkpoint. Raises
-        `MismatchError`."""
+        """Continue from the checkpoint ``path``. Rows that were written after the checkpoint are dropped from the
+        files.
+
+        Raises `MismatchError`.
+        """
         arrays = checkpoint.load(path, self.identity)
         for prefix, part in self._parts().items():
             part.state = {name: arrays[f"{prefix}.{name}"] for name in part.state}
@@ -167,7 +173,7 @@ class Recorder:
             raise MismatchError(f"cannot resume: {error}") from None
 
     def see(self, rows_piece: Piece) -> None:
-        """Record the results of a part of the integration."""
+        """Record the rows and the crossings of a part of the integration."""
         experiment, monitored = self.experiment, self.solver.interface.monitored
         if len(rows_piece.numbers):
             self.number = float(rows_piece.numbers[-1])
@@ -248,9 +254,9 @@ class Recorder:
         self._saved = time.monotonic()
 
     def means(self) -> dict[str, tuple[float, float]]:
-        """Return mean and standard error of coordinates and energy over all members, at the end of the run.
+        """Return the mean and the standard error of each coordinate and of the energy over all members.
 
-        The first member is the trajectory of the session. Raises `StepError`.
+        The time is that of the end of the run. The first member is the trajectory of the session. Raises `StepError`.
         """
         experiment, names = self.experiment, self.solver.interface
         run, parameters, steps = experiment.run, experiment.parameters, experiment.made + self.steps
@@ -267,7 +273,9 @@ class Recorder:
         return dict(zip([*names.coordinates, "energy"], pairs, strict=True))
 
     def finish(self, keep: bool) -> None:
-        """Complete the files. With ``keep``, the checkpoint remains, from which the run can be continued."""
+        """Complete the files, and remove the checkpoint. With ``keep`` the checkpoint remains, so that the run can
+        continue.
+        """
         run, names = self.experiment, np.array(self.solver.coordinates)
         time_before = 0.0
         if run.past:
@@ -316,9 +324,10 @@ class Recorder:
 
 
 def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recorder:
-    """Return the recorder at the start of its run, or with ``resume`` at its checkpoint.
+    """Start the run of a recorder or, with ``resume``, continue the run from its checkpoint. Return the
+    recorder.
 
-    Raises `click.UsageError` if the existing files do not allow this.
+    Raises `click.UsageError` if existing files prevent the start, or cannot be continued.
     """
     path, output = recorder.files.checkpoint, recorder.files.output or recorder.files.section
     if path is None or output is None:
@@ -401,7 +410,9 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
 
 
 def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Floats], None] | None) -> Iterator[Piece]:
-    """Yield the parts of a trajectory at the requested times, from the current state of a session."""
+    """Integrate from the current state of a session. Yield the parts of the trajectory, with rows at the requested
+    times.
+    """
     experiment = recorder.experiment
     if not recorder.watch.begun:
         yield standing(session, 0.0)
@@ -424,7 +435,7 @@ class _Rows:
 
 
 def _compared_rows(experiment: Experiment, h: float) -> _Rows:
-    """Return the rows of the run for a classical method that makes steps of size h in t."""
+    """Return the rows at which a classical method is compared. The steps of this method have the size h in t."""
     run, end = experiment.run, experiment.end
     last = end.span / h if end else float(run.steps)
     if experiment.times is not None:
@@ -438,10 +449,11 @@ def _compared_rows(experiment: Experiment, h: float) -> _Rows:
 def compared(
     compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console, end: float
 ) -> tuple[Watch, Trajectory]:
-    """Integrate the experiment by a classical method; return the errors of the method, and a trajectory for figures.
+    """Integrate the experiment by a classical method. Return the errors of the method, and its trajectory for
+    figures.
 
-    The method makes as many steps as the solver, and partial steps where a requested time lies inside a step. If the
-    run has a monitor, the steps of the method are equal in t and end at ``end``.
+    The method makes as many steps as the solver. If a requested time lies inside a step, the method also makes a
+    partial step. If the run has a monitor, the steps of the method are equal in t and end at ``end``.
     """
     from phigen.study import classical
     from phigen.study.methods import extended, field_of

@@ -24,7 +24,11 @@ def gathered_of_lattice(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
-    """Return the content of the page, with one run and its verification, and the errors that occurred in them."""
+    """Integrate a run of the lattice and verify the solver. Return the content of the page, and the errors that
+    occurred.
+
+    Without a run, nothing is integrated or verified.
+    """
     from phigen.report.lattice_page import LatticeMaterial
 
     material = LatticeMaterial(examination, compilation, command_line)
@@ -43,7 +47,10 @@ def _measured(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, PhigenError | None]:
-    """Return the content with a run and its verification, and the error if one of them failed."""
+    """Integrate a run and verify the solver. Return the content with the results, and an error or None.
+
+    The error says that a step failed, or that a measurement missed its bound.
+    """
     from dataclasses import replace
 
     import numpy as np

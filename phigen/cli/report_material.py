@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
 
-#: Number of steps at the beginning of a run whose states are all stored, for the viewer of the page.
+#: Largest number of steps that the viewer of the page shows without gaps. The states after all of these first steps are
+#: stored.
 _OPENING = 4_000
 
 
@@ -63,7 +64,7 @@ def gathered(
 
 
 def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
-    """Return the panel of the page that runs the solver in the browser, from the start of the experiment."""
+    """Return the live panel of the page. It runs the solver in the browser, from the start of the experiment."""
     from phigen.report import live
 
     console.note(f"{compilation.spec.name}: compiling for the page")
@@ -118,10 +119,10 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Return trajectories of the first steps, by the solver and by other methods, with the state after every
+    """Return trajectories of the first steps by the solver and by other methods, with the state after every
     step.
 
-    The result is empty if the whole run is short, since its trajectory then has every step already.
+    The result is empty if the trajectory of the whole run already has the state after every step.
     """
     from phigen.cli.recording import Files, Recorder, compared
 

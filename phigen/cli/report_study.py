@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Number of repetitions of each time measurement, by default and with --quick.
 _ROUNDS, _FEW_ROUNDS = 5, 2
-#: Largest number of steps over which --quick measures errors; without it, all steps of the run are made.
+#: Largest number of steps over which --quick measures errors. Without --quick, errors are measured over the whole run.
 _FEW_STEPS = 256
 #: File in which Linux names the processor.
 _PROCESSOR = Path("/proc/cpuinfo")
@@ -25,7 +25,7 @@ _PROCESSOR = Path("/proc/cpuinfo")
 def studied(
     compilation: Compilation, experiment: Experiment, quick: bool, console: Console
 ) -> tuple[Study | None, str]:
-    """Return the study of precision and time, or None and the reason why there is none."""
+    """Return the study of precision and time, and "". If there is no study, return None and the reason."""
     import numpy as np
 
     from phigen.api import solver_of
@@ -55,10 +55,10 @@ def studied(
 
 
 def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
-    """Return the closed form of the solution as a function of t.
+    """Return the closed form of the solution, as a function of the time since the start of the run.
 
-    Returns None if the spec does not give every coordinate. Returns None also if there is a monitor, since its steps
-    are not equal in t.
+    The result is None if the spec does not state the closed form of every coordinate. It is None also if there is a
+    monitor, because then steps are not equal in t.
     """
     import numpy as np
 
@@ -76,7 +76,7 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """Return a function that maps a state to the largest change of a Casimir since x0.
+    """Return a function that maps a state to the largest change of a Casimir from its value at x0.
 
     The change of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for this Casimir.
     For systems without Casimirs the result is None.

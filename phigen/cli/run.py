@@ -123,9 +123,9 @@ def command(
 ) -> None:
     """Integrate a run of a spec, and summarise the errors of energy, Casimirs, invariants and solution.
 
-    The solver is compiled with profile fast, unless --profile says otherwise; "profile:" in a spec is for built code.
-    The classical methods that the run lists under "compare:" are run too, with the same step size. Files are written
-    during the run; the results of an interrupted run are kept, and --resume continues it.
+    The solver is compiled with profile fast, unless --profile names another profile. The key "profile:" of a spec
+    applies to phigen build only. The classical methods that the run lists under "compare:" are run too, with the same
+    step size. Files are written during the run. The results of an interrupted run are kept, and --resume continues it.
     """
     from phigen.api import compilation_of
     from phigen.cli.endings import ended, timed

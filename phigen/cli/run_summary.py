@@ -60,7 +60,7 @@ def counted_crossings(run: Run, count: int, section: str) -> str:
 def steps_text(recorder: Recorder) -> str:
     """Return the number of steps in words, such as "60 steps of 0.1".
 
-    With a monitor, "in τ" is added; after a shorter last step, "and a part of one".
+    With a monitor, "in τ" is added. If the last step is shorter, "and a part of one" is added.
     """
     unit = " in τ" if recorder.solver.interface.monitored else ""
     part = " and a part of one" if recorder.number > recorder.steps else ""

@@ -144,7 +144,7 @@ def _print_collocation(compilation: CompiledGauss) -> None:
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
-    """Return a line that defines the functions with unusual names that occur in ``lines``; [] if there are none."""
+    """Return a line with definitions of the unusual functions that occur in ``lines``; [] if there are none."""
     from phigen.symbolic.readable import UNFAMILIAR
 
     met = [
@@ -154,7 +154,7 @@ def _unfamiliar(lines: Sequence[str]) -> list[str]:
 
 
 def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return strength σ and function g of each source of noise, as pairs of name and text."""
+    """Return the strength σ and the function g of each source of noise, as pairs of name and text."""
     terms: dict[str, Expression] = {}
     for source in system.noise:
         terms |= {f"σ_{source.name}": source.amplitude, f"g_{source.name}": source.hamiltonian}
@@ -236,7 +236,7 @@ def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str,
 
 
 def _modified(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return H̃ = H + h^p H_p + … and its first corrections, as pairs of name and text."""
+    """Return the modified Hamiltonian H̃ as a sum, and its first corrections, as pairs of name and text."""
     from phigen.notation.generating import modified_formulas
 
     corrections = modified_formulas(compilation, count, max_terms)
@@ -245,9 +245,9 @@ def _modified(compilation: Compilation, count: int, max_terms: int | None) -> li
 
 
 def _gauged(compilation: CompiledSeries) -> list[str]:
-    """Return a line that names the function from which the S_i are derived, if it is not H.
+    """Return a line with the function from which the S_i are derived; [] if this function is H.
 
-    This function is H minus multiples of Casimirs. If nothing is subtracted, the result is [].
+    The function is H minus multiples of Casimirs.
     """
     gauge = compilation.gauge
     subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]

@@ -30,10 +30,12 @@ def load_one(source: str) -> Spec:
 def spec_path(source: str) -> str:
     """Return the path of a spec file, of a folder with specs, or of a bundled spec.
 
-    The bundled spec is taken if no file or folder has its name. Raises `SpecError` if there is no bundled spec either.
+    A file, or a folder that contains specs, takes precedence over a bundled spec of the same name. Raises `SpecError`
+    if nothing has the name ``source``.
     """
     path = Path(source)
-    # A folder such as that of `phigen build kepler -o .` must not hide the bundled spec kepler.
+    # The command `phigen build kepler -o .` makes a folder kepler without specs. This folder must not hide the bundled
+    # spec.
     if source in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(source)))):
         return str(resources.bundled()[source])
     if path.exists():
@@ -47,7 +49,7 @@ def as_given(spec: Spec) -> str:
 
 
 def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
-    """Return the specs in files and below folders, in natural order; errors go to the collector.
+    """Return the specs in files and below folders, in natural order. Errors go to the collector.
 
     Two specs of the same name are an error, since their output would be in the same place.
     """
@@ -68,7 +70,9 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
 
 
 def spec_files(source: str) -> Iterator[str]:
-    """Yield the spec file, or the bundled spec; for a folder, yield the spec files below it, without hidden ones."""
+    """Yield the path of a spec file or of a bundled spec. For a folder, yield the spec files below it that are not
+    hidden.
+    """
     path = spec_path(source)
     if not Path(path).is_dir():
         yield path

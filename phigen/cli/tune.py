@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run
     from phigen.tuning.problem import Problem
 
-#: Accuracies by default, in double and in single precision. Rounding errors of single precision reach the latter after
-#: some million steps.
+#: Default accuracies, in double and in single precision. In single precision, rounding errors reach 1e-4 after some
+#: million steps.
 ACCURACY, SINGLE_ACCURACY = 1e-8, 1e-4
 
 
@@ -162,10 +162,10 @@ def initial_value_problem(
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
-    """Return the initial value problem of an experiment over the length ``horizon``, by default that of its
-    run.
+    """Return the initial value problem of an experiment.
 
-    The length is in the time t or, with a monitor g, in the rescaled time τ, for which dt = g dτ.
+    Its length is ``horizon``, by default the length of the run. The length is in the time t or, with a monitor g, in
+    the rescaled time τ, for which dt = g dτ.
     """
     import numpy as np
 
@@ -186,7 +186,7 @@ def problem_of(compilation: Compilation, experiment: Experiment, horizon: float 
 def _of_lattice(
     console: Console, compilation: Compilation, run: Run, settings: tuple[str, ...], horizon: float | None, measure: str
 ) -> Problem:
-    """Return the initial value problem for a run of a lattice. It has fewer sites than the run if the run has many."""
+    """Return the initial value problem for a run of a lattice. A large lattice is replaced by one with fewer sites."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended, length
     from phigen.cli.lattice_experiment import LatticeExperiment
@@ -219,7 +219,7 @@ def _of_lattice(
 
 
 def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """Return a first estimate of the step size; the length of time to integrate; and the sign of the step.
+    """Return a first estimate of the step size, the length of time to integrate, and the sign of the step.
 
     The length is ``horizon``, by default that of the run.
     """

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 #: Further accuracies for which results are shown, as multiples of the requested accuracy.
 _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
-#: If the error of the cheapest setting is smaller than the accuracy by more than this factor, a remark says that larger
-#: steps fail. An error this small shows that the accuracy did not limit the step.
+#: If the error of the cheapest setting is smaller than the accuracy by more than this factor, the accuracy did not
+#: limit the step. Then a remark says that larger steps fail.
 _UNDECIDED_FACTOR = 20
-#: Largest number of monitors in the table. Least factor by which a monitor must reduce the number of steps; otherwise
-#: it is not proposed, since each step with a monitor costs more. Number of characters to which formulas in the table
-#: are cut.
+#: _MOST_MONITORS: largest number of monitors in the table. _LEAST_GAIN: a monitor is proposed only if it reduces the
+#: number of steps by this factor, since each step with a monitor costs more. _FORMULA_LENGTH: number of characters to
+#: which formulas in the table are cut.
 _MOST_MONITORS, _LEAST_GAIN, _FORMULA_LENGTH = 5, 2.0, 60
 #: Number of states that the proposed run of an ordinary system stores, enough for a figure.
 _STORED_STATES = 1000
@@ -122,8 +122,8 @@ def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
 
 
 def gauge_of(curve: Curve) -> str:
-    """Return how the gauge of a method (the multiples of Casimirs that are subtracted from H) is chosen, in the words
-    of the spec.
+    """Return the gauge of a method in the words of the spec: how the multiples of Casimirs to subtract from H are
+    chosen.
 
     Returns "none" for methods without a gauge, and "" for classical methods.
     """
@@ -182,9 +182,9 @@ def remarks(tuning: Tuning) -> Iterator[str]:
 
 
 def _automatic(tuning: Tuning) -> str:
-    """Return a sentence on the scheme that ``scheme: auto`` chooses.
+    """Return a sentence that compares ``scheme: auto`` with the best setting.
 
-    It compares the time that this scheme needs with the time of the best setting.
+    The sentence names the scheme that auto chooses, and the time that the best method of this scheme needs.
     """
     assert tuning.winner is not None
     ratio, text = (
@@ -202,7 +202,9 @@ def _extrapolated(tuning: Tuning) -> str:
 
 
 def _other_rows(tuning: Tuning) -> list[list[str]]:
-    """Return table rows for `_FURTHER_ACCURACIES`: for each that was reached, the cheapest measured setting."""
+    """Return a table row for each of `_FURTHER_ACCURACIES` that was reached. The row has the cheapest measured
+    setting.
+    """
     from phigen.tuning.search import cheapest_step
 
     rows = []
@@ -225,8 +227,8 @@ def lines_of(finalist: Finalist) -> list[str]:
 def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
     """Return the lines of the proposed run: step, number of steps up to the horizon, and stride.
 
-    If the run has a key ``stop``, it is one step longer, so that the stop is reached. The stride is large, since a
-    solver is faster if it makes many steps between two stored states.
+    If the run has a key ``stop``, one step is added, so that the stop is reached. The stride is large, since a solver
+    is faster if it makes many steps between two stored states.
     """
     assert tuning.winner is not None
     step = tuning.winner.point.step

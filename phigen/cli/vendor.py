@@ -160,7 +160,7 @@ def _from_specs(
     checking: bool,
     collector: Collector,
 ) -> list[VendorRequest]:
-    """Return the requests for the specs that the command line names, with its options.
+    """Return requests for the specs that the command line names. The options are those of the command line.
 
     A check without options uses the options of each solver in the manifest.
     """

@@ -64,7 +64,7 @@ def command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Build every target of specs and measure whether the solvers keep their promises.
+    """Build every target of specs, and measure whether the solvers have the promised properties.
 
     The command measures the observed order, the errors of Casimirs and energy, the Poisson identity with the exact
     tangent map, reversibility, agreement of the targets, and the largest step with which the solver converges. It also
@@ -121,7 +121,8 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
-    """Return how much the modified Hamiltonian changes along a run, for each number 0, 1, … of its corrections.
+    """Return how much the modified Hamiltonian changes along a run: without corrections, and with 1, 2, …
+    corrections.
 
     Raises `NotOfferedError` and `StepError`.
     """
@@ -142,10 +143,10 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
 def verified(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """Return the verification of a compilation with its tangent map, on a run of its spec.
+    """Verify a compilation that has the tangent map of a step, on a run of its spec.
 
     ``targets`` are by default those of the spec; targets that Python cannot run are left out. Only whole steps are
-    made, at least one: a shorter last step of the run is left out.
+    made, at least one. If the last step of the run is shorter, it is left out.
     """
     from phigen.api import chosen_target, solver_of
     from phigen.cli.endings import ended
@@ -169,7 +170,7 @@ def verified(
 def verified_lattice(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """Return the verification of the compilation of a lattice, on a run of its spec."""
+    """Verify the compilation of a lattice, on a run of its spec."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended
     from phigen.cli.lattice_experiment import LatticeExperiment
