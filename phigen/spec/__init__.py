@@ -1,7 +1,7 @@
-"""Reader of spec files. It makes a `Spec`, which has the place of each part in the file, and reports all errors of a
-file together.
+"""Reader of spec files.
 
-`load` and `loads` read a spec, `schema` describes the format for editors, `starter` returns a first spec.
+`load` and `loads` return a `Spec`, which contains the place of each of its parts in the file. Both functions report all
+errors of a file together. `schema` describes the format for editors, and `starter` returns a first spec.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ __all__ = ["load", "loads", "schema", "starter"]
 def load(path: str | PathLike[str]) -> Spec:
     """Return the spec in a file.
 
-    Raises `SpecError` with all errors, in the order of the file; `LimitError` if all of them are exceeded limits.
+    Raises `SpecError` with all errors, in the order of the file. If each of these errors is that the file exceeds a
+    limit, the exception is a `LimitError`.
     """
     from phigen import resources
     from phigen.errors import Diagnostic, SpecError
@@ -45,7 +46,9 @@ def load(path: str | PathLike[str]) -> Spec:
 
 
 def loads(text: str, file: str = "<string>") -> Spec:
-    """Return the spec in a text. Messages show ``file`` as the name of the text. Raises the errors of `load`."""
+    """Return the spec in a text. Messages show ``file`` as the name of the text. Raises the same exceptions as
+    `load`.
+    """
     from phigen.spec.validate import validate
 
     return validate(text.encode("utf-8", "surrogatepass"), file)

@@ -9,8 +9,8 @@ from typing import Any
 from phigen.symbolic.expression import Expression, fold
 from phigen.symbolic.numeric import Numbers, evaluate_precisely
 
-#: Decimal digits of the evaluation. A double has 16; the other digits are a reserve for cancellations inside the
-#: formula.
+#: Decimal digits of the evaluation. A double has 16. The other digits are a reserve, since terms of the formula may
+#: cancel.
 DIGITS = 77
 
 

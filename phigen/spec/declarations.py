@@ -46,7 +46,7 @@ class Declarations:
     noisy: bool = False
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
-    within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
+    within: tuple[Any, ...] = ("poisson",)  # the keys on the path to the Poisson structure that is being read
     # names that expressions must not use; each with the message and the hint of the error
     refused: dict[str, tuple[str, str]] = field(default_factory=dict)
     lattice: Lattice | None = None
@@ -66,7 +66,7 @@ class Declarations:
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Return the names with values at bonds only, each with the error (message, hint) for its use at a site."""
+        """Return the names that have values at bonds only. Each has the error (message, hint) for its use at a site."""
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
             {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
@@ -74,7 +74,9 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """Return the names of indices and sizes (i, N_i), each with the error (message, hint) if a density uses it."""
+        """Return the names of indices and sizes (i, N_i). Each has the error (message, hint) for its use in a
+        density.
+        """
         reason = "this expression must be the same for all sites"
         hint = "a parameter at: sites has a value for each site"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
@@ -84,10 +86,10 @@ class Declarations:
         }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """Return the record of the names that may have an index: those of ``names`` that depend on the site.
+        """Return the record of those ``names`` that may have an index: they depend on the site.
 
-        The result is None if no name may have an index. With ``ends``, an index is an end of a bond, otherwise it is an
-        offset on a grid.
+        The result is None if no name may have an index. An index is an offset on a grid or, with ``ends``, an end of a
+        bond.
         """
         if self.lattice is None or not self.indexed:
             return None
@@ -102,10 +104,10 @@ class Declarations:
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
-        """Return the names that a formula of a bond or pair may use; at its ends a and b, x is ``x[a]`` and
-        ``x[b]``.
+        """Return the names that a formula of a bond or a pair may use.
 
-        ``dated`` includes the time, which densities of H may depend on, but brackets may not.
+        At the ends a and b, the values of a coordinate x are ``x[a]`` and ``x[b]``. If ``dated``, the time is allowed.
+        Densities of H may depend on the time, but brackets may not.
         """
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
@@ -119,7 +121,7 @@ class Declarations:
         return AllowedNames(common_names, refused, open=self.incomplete, indices=indices)
 
     def site_numbers(self) -> AllowedNames:
-        """Return the names that formulas of values at sites may use: indices (i, from 0) and sizes (N_i)."""
+        """Return the names for formulas of values at sites: indices (i, counted from 0) and sizes (N_i)."""
         indices = self.lattice.indices if self.lattice and self.relation != "graph" else ()
         names = {n: symbol(n) for i in indices for n in (i, f"N_{i}")}
         return AllowedNames(names, self.numbers().refused)
@@ -146,7 +148,8 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return the names that functions on phase space and densities of sites may use, except the time.
+        """Return the names that functions on phase space may use, and densities of sites too. The time is not
+        allowed.
 
         ``extra`` has further names with their expressions.
         """
@@ -158,7 +161,7 @@ class Declarations:
         return AllowedNames(allowed_names, refused, open=self.incomplete, indices=self.indices(allowed_names))
 
     def dated_scope(self) -> AllowedNames:
-        """Return the names for functions on phase space that may depend on the time."""
+        """Return the names that `scope` returns, and also the time and definitions that depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
         bonds = self._at_bonds(dated)
@@ -168,7 +171,9 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """Return the time and the definitions that depend on it, each with the error (message, hint) for its use."""
+        """Return the time, and the definitions that depend on the time. Each has the error (message, hint) for
+        its use.
+        """
         hint = "only the Hamiltonian, invariants, sections and exact solutions may"
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
@@ -377,7 +382,9 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter with values at sites or at bonds (``domain``) if the spec has no sites or no bonds."""
+    """Report a parameter whose values are at sites or bonds (``domain``) if the lattice does not have these
+    elements.
+    """
     relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
         needs = "a lattice with a graph" if domain == "bonds" and declared.relation else "specs with lattice:"
@@ -389,8 +396,9 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # At first, every name stands for a symbol. Definitions are read after those that they use, so that the symbol is
-    # replaced by the expression before it is used. In a cycle of definitions, which is an error, the symbol remains.
+    # At first, the name of each definition stands for a symbol; when a definition has been read, its name stands for
+    # its expression. A definition is read after the definitions that it uses. So a symbol remains only in a cycle of
+    # definitions, which is an error.
     scope = declared.dated_scope()
     names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
@@ -409,8 +417,8 @@ def _in_order(
 ) -> list[str]:
     """Return the names of the definitions, sorted so that each comes after the definitions that it uses.
 
-    ``uses`` maps each name to the names in its expression, ``keys`` to its key in the file. A cycle is reported, and
-    then broken at its first definition.
+    ``uses`` maps the name of a definition to the names in its expression; ``keys`` maps it to its key in the file. A
+    cycle is reported, and then broken at its first definition.
     """
     graph = {name: [u for u in used_names if u in uses] for name, used_names in uses.items()}
     while True:

@@ -280,8 +280,8 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for keys that users may write inside a run, although the setting belongs to the whole spec, to a call in
-#: Python, or to a key of runs with another name.
+#: Hints for words that users may write as keys of a run. The setting belongs to the whole spec or to a call in Python,
+#: or the key has another name.
 _BESIDE_RUNS = {
     key: f"{key}: belongs beside runs, to the whole spec"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")

@@ -9,7 +9,7 @@
     atom     = number | name | indexed | function "(" sum ("," sum)* ")" | "(" sum ")" | choice
     choice   = "if" "(" sum ("<" | "<=" | ">" | ">=") sum "," sum "," sum ")"
 
-Piecewise functions, of which ``if`` is one, are allowed in observables and ``stop`` only. Names with an index, such as
+Piecewise functions such as ``if`` are allowed in observables and ``stop`` only. Names with an index, such as
 ``x[i+1]``, are allowed in lattices; `phigen.spec.indices` reads them. Precedences are those of Python: ``-x**2`` is
 −(x²) and ``2**3**2`` is 2⁹.
 
@@ -66,7 +66,7 @@ class AllowedNames:
 
     ``names`` maps each allowed name to its expression. ``refused`` has names that exist but are not allowed here, each
     with a message and a hint. If ``open``, unknown names are accepted as symbols. ``indices`` describes the names that
-    may have an index, None if there are none. ``piecewise`` allows functions without a derivative
+    may have an index; it is None if no name may have one. If ``piecewise``, functions without a derivative are allowed
     (`phigen.spec.names.PIECEWISE_FUNCTIONS`).
     """
 
@@ -403,7 +403,8 @@ class Parser:
         return self.applied(token, arguments)
 
     def piecewise(self, token: Token, opening: Token) -> Expression:
-        """Read the arguments of a piecewise function, and return its value as an expression in ``choose`` or ``sign``.
+        """Read the arguments of a piecewise function. Return the function as an expression that uses ``choose`` or
+        ``sign``.
 
         ``token`` is the name of the function, ``opening`` its parenthesis; both have been read.
         """
@@ -446,7 +447,9 @@ class Parser:
         return sqrt(first) if function == "sqrt" else call(function, *arguments)
 
     def raised(self, base: Expression, exponent: Fraction, token: Token) -> Expression:
-        """Return base ** exponent; if this is undefined or too large, report it, and return 1 without computing it."""
+        """Return base ** exponent. If the power is undefined or too large, report this, and return 1 without computing
+        it.
+        """
         if abs(exponent) > limits.EXPONENT:
             message = f"the exponent {_brief(exponent)} is out of range"
             self.report(
@@ -469,9 +472,10 @@ class Parser:
         return self.bounded(power(base, exponent), token)
 
     def bounded(self, result: Expression, token: Token) -> Expression:
-        """Return the result of an operation; if a constant or exponent in it is out of range, report it, and return 1.
+        """Return the result of an operation. If a constant or an exponent in it is out of range, report this, and
+        return 1.
 
-        Constant folding can make such constants, as in 1e30*1e30.
+        Constant folding can make constants that are out of range, as in 1e30*1e30.
         """
         parts = [result, *result.args]
         for part in [*parts, *(a for p in parts[1:] for a in p.args)]:
@@ -509,9 +513,9 @@ def _defined(function: str, *arguments: Fraction) -> bool:
 
 
 def constant(expression: Expression) -> Fraction | None:
-    """Return the value of an expression without symbols: exact if it was folded to a rational, else the nearest double.
+    """Return the value of an expression without symbols; None if it is not a finite real number.
 
-    None if the value is not a finite real number.
+    The value is exact if the expression was folded to a rational. Otherwise it is the nearest double.
     """
     if expression.is_number:
         value: Fraction = expression.value

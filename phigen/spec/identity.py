@@ -1,4 +1,4 @@
-"""Digest of a spec. Files of results with the same digest have the same quantities in their columns."""
+"""Digest of a spec. If two files of results have the same digest, their columns contain the same quantities."""
 
 from __future__ import annotations
 

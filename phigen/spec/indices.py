@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Indices:
-    """Names that may have an index, and the indices that they may have.
+    """Names that may have an index, and the form of the index.
 
     ``names`` maps each name that has a value at every site to its expression at the site itself. ``refused`` has the
     messages and hints for names without values at sites. On a grid an index is an offset from the site; on a bond it is
@@ -36,7 +36,8 @@ class Indices:
     ends: tuple[str, ...] = ()
 
     def read(self, parser: Parser, token: Token) -> Expression:
-        """Read the index after a name; return the expression of the name at that neighbour or at that end of a bond.
+        """Read the index after a name. Return the expression of the name at the neighbour, or the end of a bond, with
+        this index.
 
         ``token`` is the name; the current token of the parser is ``[``.
         """

@@ -10,7 +10,8 @@ from phigen.spec.fields import FORMAT_VERSION, SPEC
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a spec file.
 
-    Every spec that phigen accepts conforms to it. Rules that can be checked only by reading expressions are left out.
+    Every spec that phigen accepts conforms to this schema. Rules that can be checked only by reading expressions are
+    left out.
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -35,7 +35,10 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """Record of what was read: the errors, and the place and the purpose of each value by its path of keys."""
+    """Results of reading: the errors so far, and the place and the purpose of each value.
+
+    A value is identified by its path of keys.
+    """
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
@@ -47,7 +50,7 @@ class Reader:
 
 
 def label(path: Path) -> str:
-    """Return the beginning of messages about a value: ``key: ``, with the innermost key of its path."""
+    """Return the beginning of messages about a value: the last key on its path, and a colon."""
     keys = [part for part in path if isinstance(part, str)]
     return f"{keys[-1]}: " if keys else ""
 
@@ -86,7 +89,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Text(Kind):
-    """Prose, such as a title or a description. It has one line or, with ``lines``, may have several lines."""
+    """Prose, such as a title or a description. It may have several lines if ``lines`` is true, else only one."""
 
     lines: bool = False
     expected = "text"
@@ -113,9 +116,10 @@ class Text(Kind):
 
 @dataclass(frozen=True)
 class ShapedText(Kind):
-    """A text that matches ``pattern``; ``expected`` is what messages call it.
+    """A text that matches ``pattern``. Messages call this text ``expected``.
 
-    ``hint`` is the hint for a text of another form, ``example`` that for a node that is no text.
+    Messages about a text that does not match have the hint ``hint``. Messages about a node that is no text have the
+    hint ``example``.
     """
 
     pattern: str
@@ -132,7 +136,7 @@ class ShapedText(Kind):
         return node if self.accepts(node, reader) else None
 
     def accepts(self, node: Scalar, reader: Reader) -> bool:
-        """Return whether the text has the form; an error is reported if it does not."""
+        """Return whether the text matches and is not too long. Otherwise an error is reported."""
         if len(node.text) > self.longest:
             message = f"the name {shown(node.text, 30)} has {len(node.text)} characters, the limit is {self.longest}"
             reader.error(node, message, limit=True)
@@ -176,7 +180,7 @@ class Integer(Kind):
 
     least: int
     most: int
-    limit: bool = False  # whether a number above the largest is a LimitError
+    limit: bool = False  # whether a number above ``most`` exceeds a limit (`LimitError`)
 
     expected = "an integer"
 
@@ -251,7 +255,7 @@ class ListOf(Kind):
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
-            # The keys of the mapping are read as the list, so that the names are declared and later uses of them are
+            # The keys of the mapping are read as the list. So the names are declared, and later uses of these names are
             # not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
@@ -318,16 +322,17 @@ class RecordKey:
     kind: Kind
     description: str
     required: bool = False
-    default: Any = None  # default that the schema shows to users; the validator uses those of model.py
+    default: Any = None  # default that the JSON Schema shows; model.py has the default that applies
 
 
 @dataclass(frozen=True)
 class Record(Kind):
     """A mapping with fixed keys. It is read as a dictionary, from which keys with errors are left out.
 
-    At most one of the keys in ``one`` may be present. ``exactly`` requires one of them, or a key in ``instead``; keys
-    in ``instead`` may be combined with those in ``one``. ``some`` refuses an empty mapping. ``example`` is shown in the
-    error if the value is no mapping. ``elsewhere`` has hints for keys that belong to another part of the spec.
+    At most one of the keys in ``one`` may be present. If ``exactly``, one of these keys is required, unless a key in
+    ``instead`` is present. Keys in ``instead`` may be combined with those in ``one``. If ``some``, the mapping must not
+    be empty. If the value is no mapping, the error shows ``example``. ``elsewhere`` has hints for keys that belong to
+    another part of the spec.
     """
 
     what: str
@@ -374,11 +379,12 @@ class Record(Kind):
         return value
 
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
-        """Report an unknown key. Return the key that was probably meant, "" if none was, and the value under that key.
+        """Report an unknown key. Return the known key that was probably meant ("" if there is none), and its
+        value.
 
-        The value is read, so that the names that it declares are known, and errors inside it are reported. It is None
-        if it cannot be read, or if the unknown key is a synonym from another program (`MEANT`), where values often have
-        another form.
+        Reading the value declares the names in it and reports its errors. The value is None if it cannot be read. It is
+        None too if the unknown key is a word of another program (`MEANT`), because values often have another form
+        there.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)
@@ -417,7 +423,7 @@ class Record(Kind):
     def instructions(self, node: Node | None = None) -> str:
         """Return the hint that shows the form of the mapping: an example and the keys.
 
-        If ``node`` is the name of a key, without a value, the hint shows how to write this key instead.
+        If ``node`` is only the name of a key, the hint shows how to write this key with a value.
         """
         named_field = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
         if named_field is not None and isinstance(named_field.kind, Record) and named_field.kind.example:
@@ -487,5 +493,7 @@ class Either(Kind):
 
 
 def place(key: Scalar, value: Node) -> Location:
-    """Return the place for messages about an entry of a mapping: its value if this is a scalar, else its key."""
+    """Return the place for messages about an entry of a mapping: that of the value if it is a scalar, else that of the
+    key.
+    """
     return value.location if isinstance(value, Scalar) and not value.is_null else key.location

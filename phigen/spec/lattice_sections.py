@@ -21,7 +21,7 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 KINDS = ("sites", "sum", "product")
-#: Keys under ``hamiltonian:`` for densities of H of two sites, and the relation between sites that each key requires.
+#: Keys under ``hamiltonian:`` for densities that depend on two sites. Each key requires a relation between the sites.
 COUPLINGS = {"bonds": "graph", "pairs": "pairs"}
 _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 

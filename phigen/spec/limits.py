@@ -27,7 +27,7 @@ EXPRESSION_DEPTH = 64
 NUMBER = 10**40
 #: Denominators of rationals are smaller than this. So a decimal may have up to 79 places after the point.
 DENOMINATOR = 10**80
-#: Largest absolute value of a literal exponent; ``x**n`` is emitted as products.
+#: Largest absolute value of a literal exponent. The generated code computes ``x**n`` by products.
 EXPONENT = 1_000
 #: Largest offset of a neighbour along an axis of a lattice.
 OFFSET = 8
@@ -48,10 +48,11 @@ TEXT_LENGTH = 20_000
 ORDER = 16
 #: Largest number of correction terms of the modified Hamiltonian.
 CORRECTIONS = 8
-#: Largest number of operations in one generated function; the gradient and the Hessian of S_h have the most. At the
-#: limit, the C has about 5 MB and compiles in about a minute.
+#: Largest number of operations in one generated function. The gradient and the Hessian of the generating function have
+#: the most operations. At the limit, the C has about 5 MB and compiles in about a minute.
 OPERATIONS = 100_000
-#: Largest number of monomials of a term S_i of the Hamilton–Jacobi series: the next S_i would take minutes to compute.
+#: Largest number of monomials of a term S_i of the Hamilton–Jacobi series. After a term of this size, the next term
+#: would take minutes to compute.
 SERIES_TERMS = 50_000
 #: Largest number of exponents that are stored when a polynomial and its derivatives are expanded; each monomial has one
 #: exponent for each symbol. At the limit this takes 80 MB and some seconds.
@@ -59,9 +60,9 @@ CELLS = 8_000_000
 #: If the proof of a bi-realisation is estimated to need more products of terms than this, the bi-realisation is checked
 #: at sample points instead. At the limit, the proof takes ten seconds.
 PROOF_PRODUCTS = 20_000_000
-#: Largest seed of noise, which has 64 bits, and largest number of paths (members), which are numbered with 32 bits.
+#: Largest seed of noise (a seed has 64 bits), and largest number of members (they are numbered with 32 bits).
 SEED, MEMBERS = 2**64 - 1, 2**32
-#: Largest seed of a sweep. The counter-based random generator takes words of 64 bits, whose sign bit stays 0.
+#: Largest seed of a sweep. The counter-based random generator takes words of 64 bits, and their sign bit must be 0.
 SWEEP_SEED = 2**63 - 1
 #: Largest number of sources of noise.
 SOURCES = 64

@@ -29,10 +29,11 @@ Matrix = tuple[tuple[Expression, ...], ...]
 class Values:
     """An array over the sites, or the bonds, of a lattice.
 
-    The values come from exactly one of four sources. ``formula`` uses the symbols of the indices and sizes, ``i`` and
-    ``N_i``. ``listed`` is in the order of the array, the last axis fastest. ``file`` is a path relative to the folder
-    of the spec. ``random`` names a distribution: ``normal``, ``uniform`` between −1 and 1, or ``sphere`` for all fields
-    of a site together. Random numbers are multiplied by ``scale``; if there is a formula too, it is their mean.
+    The values come from one of four sources. ``formula`` uses the symbols of the indices and sizes, ``i`` and ``N_i``.
+    ``listed`` is in the order of the array, the last axis fastest. ``file`` is a path relative to the folder of the
+    spec. ``random`` names a distribution: ``normal``, ``uniform`` between −1 and 1, or ``sphere`` for all fields of a
+    site together. Random numbers are multiplied by ``scale``. Together with ``random``, a formula is the mean of the
+    random numbers.
     """
 
     formula: Expression | None = None
@@ -45,12 +46,12 @@ class Values:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of the spec, a run-time argument of the generated code.
+    """A parameter of the spec, which is a run-time argument of the generated code.
 
-    ``value`` is its default. ``small`` says that the terms of H with this factor are a small perturbation,
-    ``nonnegative`` that the parameter is 0 or positive. ``at`` is ``all`` for one number; in lattices, ``sites`` or
-    ``bonds`` means an array with a value at each site or bond. If the defaults of an array are not all equal, they are
-    in ``values``, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is converted.
+    ``value`` is the default. If ``small``, the terms of H with this factor are a small perturbation. If
+    ``nonnegative``, the parameter is 0 or positive. ``at`` is ``all`` for one number. In lattices, ``sites`` or
+    ``bonds`` stands for an array with a value at each site or bond. If the defaults of an array are not all equal,
+    ``values`` describes them, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is converted.
     """
 
     name: str
@@ -80,14 +81,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class MatrixForm:
-    """π as a full matrix, π_ij = {x_i, x_j}: that of ``matrix:``, or ``brackets:`` completed by skew symmetry."""
+    """π as a full matrix with the entries π_ij = {x_i, x_j}.
+
+    The entries come from ``matrix:``, or from ``brackets:`` together with skew symmetry.
+    """
 
     entries: Matrix
 
 
 @dataclass(frozen=True)
 class CanonicalForm:
-    """{q_i, p_i} = 1, all other brackets 0; coordinates named in neither list are Casimirs."""
+    """{q_i, p_i} = 1, and all other brackets are 0. Coordinates that are in neither list are Casimirs."""
 
     q: tuple[str, ...]
     p: tuple[str, ...]
@@ -134,8 +138,8 @@ class ProductForm:
 class PullbackForm:
     """A Poisson structure that is given in other coordinates y.
 
-    The names of y are ``coordinates``; the form of the structure in y is ``of``. ``map`` has y as expressions in the
-    coordinates x of the spec, ``inverse`` has x as expressions in y; it is None if the spec does not state it.
+    ``coordinates`` has the names of y, and ``of`` is the form of the structure in y. ``map`` has y as expressions in
+    the coordinates x of the spec. ``inverse`` has x as expressions in y; it is None if the spec does not state it.
     """
 
     coordinates: tuple[str, ...]
@@ -149,10 +153,10 @@ PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | N
 
 @dataclass(frozen=True)
 class BirealisationChoice:
-    """The choice of a bi-realisation in a spec: its ``kind``, and options, each of which applies to one or two kinds.
+    """The choice of a bi-realisation in a spec: its ``kind``, and options for some kinds.
 
-    ``alpha`` and ``beta`` are for the kind ``custom``. ``order`` is the order of the method if an option of a command
-    or a call overrides the order in the spec; the kind ``spray`` truncates its series accordingly.
+    ``alpha`` and ``beta`` are for the kind ``custom``. ``order`` is set if an option of a command or a call overrides
+    the order in the spec. The kind ``spray`` uses it to truncate its series.
     """
 
     kind: str = "auto"
@@ -201,7 +205,9 @@ class Extras:
     included: frozenset[str] = frozenset()
 
     def offers(self, part: str, profile: str) -> bool:
-        """Whether code with this profile includes a part of `phigen.spec.names.PARTS`, if the part fits the system."""
+        """Whether code with this profile includes a part of `phigen.spec.names.PARTS`. The part must also fit the
+        system.
+        """
         return part not in self.without | (LEFT_OUT[profile] - self.included)
 
 
@@ -225,9 +231,9 @@ class Overrides(TypedDict, total=False):
 class AverageChoice:
     """Setting ``average:`` of a run: the time averages to compute.
 
-    ``of`` lists the observables to average; if it is empty, all are averaged. Rows from the time ``after`` on are
-    averaged, all rows if it is None. They are divided into at least ``blocks`` blocks, from whose means the statistical
-    error follows.
+    ``of`` lists the observables to average; if it is empty, all are averaged. The averages are over the rows from the
+    time ``after`` on, or over all rows if it is None. These rows are divided into at least ``blocks`` blocks. The
+    statistical error follows from the means of the blocks.
     """
 
     after: Fraction | None = None
@@ -258,7 +264,7 @@ class Run:
     every: Fraction | None = None  # physical time between stored rows, instead of the stride
     average: AverageChoice = AverageChoice()
     at: tuple[Fraction, ...] = ()  # times of stored rows, instead of the stride
-    stop: Expression | None = None  # the run ends where this passes through 0
+    stop: Expression | None = None  # the run ends where this expression passes through 0
     record: tuple[str, ...] = ()  # columns of the output (state, energy, Casimirs, observables); all by default
     # ranges of coordinates for which phigen certify bounds the errors of a step
     box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
@@ -272,7 +278,7 @@ class Run:
 
     @property
     def records_numbers(self) -> bool:
-        """Whether ``record`` names columns, but not the states, so that each row has only a few numbers."""
+        """Whether ``record`` is set and does not include the states. Then each row has only a few numbers."""
         return bool(self.record) and "state" not in self.record
 
 
@@ -280,7 +286,7 @@ class Run:
 class SpectrumChoice:
     """Setting ``spectrum:`` of a run of a lattice: the power spectrum S(q, ω) of the fields ``of``.
 
-    It is computed from the stored states (frames) from the time ``after`` on; None means all frames.
+    The stored states (frames) from the time ``after`` on are used; None means all frames.
     """
 
     of: tuple[str, ...]
@@ -346,7 +352,8 @@ class Axis:
 class Statistic:
     """Number that a sweep stores for an observable: a statistic over the run, or the value at its end.
 
-    ``of`` is ``mean``, ``std`` (standard deviation) or ``error`` (of the mean); "" means the value at the end.
+    ``of`` is ``mean``, ``std`` (standard deviation) or ``error`` (standard error of the mean); "" means the value at
+    the end.
     """
 
     observable: str
@@ -384,7 +391,9 @@ class SweepSettings:
 
     @property
     def stored(self) -> tuple[str, ...]:
-        """The entries of ``keep``; each ``mean(M)`` adds ``error(M)``, because figures draw the error bars of means."""
+        """The entries of ``keep``, and ``error(M)`` for each ``mean(M)``, because figures draw the error bars
+        of means.
+        """
         errors = (word.replace("mean(", "error(", 1) for word in self.keep if word.startswith("mean("))
         return tuple(dict.fromkeys((*self.keep, *errors)))
 
@@ -463,8 +472,8 @@ class SpecNoise:
 class Spec:
     """Content of a spec file. With a ``lattice``, coordinates, π and H are those of one site.
 
-    `locations` has the place of each part in the file by its path of keys, such as ``("casimirs", "C")``. If options of
-    a command or a call have replaced parts, `written` is the spec as it stands in the file.
+    `locations` maps the path of keys of each part, such as ``("casimirs", "C")``, to the place of the part in the file.
+    If options of a command or a call have replaced parts, `written` is the spec as it stands in the file.
     """
 
     name: str
@@ -519,7 +528,9 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """Order that the spec requests; with ``terms``, the order of a symmetric method with these terms."""
+        """Order that the spec requests. If it states ``terms`` instead, the order of a symmetric method with these
+        terms.
+        """
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(
@@ -559,8 +570,8 @@ class Spec:
     def for_running(self, **options: Unpack[Overrides]) -> Spec:
         """Return the spec with options applied, for code that phigen itself runs.
 
-        Such code has the profile fast, unless the options name another one, and its parameters can be changed between
-        steps. The ``profile`` in the spec holds only for the code that ``phigen build`` writes.
+        This code has the profile fast, unless the options name another one. Its parameters can be changed between
+        steps. The ``profile`` in the spec applies only to the code that ``phigen build`` writes.
         """
         options["profile"] = options.get("profile") or "fast"
         spec = self.overridden(**options)
@@ -573,7 +584,10 @@ class Spec:
         return {p.name: float(run.parameters.get(p.name, p.value)) for p in self.parameters}
 
     def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
-        """Return a diagnostic at the part with this path of keys, or at the nearest part around it that has a place."""
+        """Return a diagnostic with the place of the part that has this path of keys.
+
+        If the place of this part is unknown, the diagnostic has the place of the nearest part around it.
+        """
         while path and path not in self.locations:
             path = path[:-1]
         location = self.locations.get(path)

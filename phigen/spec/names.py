@@ -10,8 +10,8 @@ from phigen.symbolic.functions import FUNCTIONS
 #: Functions that expressions may use, with their number of arguments.
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f.name: f.arity for f in FUNCTIONS.values() if not f.own}
 
-#: Piecewise functions with their number of arguments. Only observables and ``stop`` may use them, because these
-#: expressions are not differentiated.
+#: Piecewise functions with their number of arguments. Only observables and ``stop`` may use them, because
+#: observables and ``stop`` are not differentiated.
 PIECEWISE_FUNCTIONS: dict[str, int] = {"sign": 1, "heaviside": 1, "min": 2, "max": 2, "if": 3}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
@@ -101,7 +101,7 @@ PROFILES = ("fast", "small", "certified")
 #: Number types of the C.
 REALS = ("double", "float")
 
-#: Parts of the generated code that can be left out one by one. Below, the parts that each profile leaves out.
+#: PARTS: parts of the generated code that can be left out one by one. LEFT_OUT: the parts that each profile leaves out.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "parameters", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
@@ -112,10 +112,11 @@ LEFT_OUT = {
 #: Directions of crossings of a section.
 DIRECTIONS = ("rising", "falling", "both")
 
-#: Quantities that a sweep may vary besides parameters and initial values; below, the quantities that it may store.
+#: SWEEP_NAMES: quantities that a sweep may vary besides parameters and initial values. KEPT: quantities that it may
+#: store.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: Reductions of the density of an observable of a lattice to one number; below, the reductions that are linear.
+#: REDUCTIONS: ways to reduce the density of an observable of a lattice to one number. ADDITIVE: those that are linear.
 REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
 #: Elements of a lattice over which the density of an observable may be reduced.
@@ -124,12 +125,12 @@ OVER = ("sites", "bonds", "pairs")
 #: standard error error(M) of the mean.
 STATISTICS = ("mean", "std", "error")
 
-#: Representations of an attitude, the rotation of a rigid body, that ``reconstruct:`` may name.
+#: Representations of an attitude (the rotation of a rigid body) that ``reconstruct:`` may name.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of parts of H. CORRECTED: those for near-integrable systems with a corrector.
-#: NEAR_INTEGRABLE: all those for near-integrable systems, with and without a corrector. FLOW_COMPOSITIONS:
-#: NEAR_INTEGRABLE, and compositions for splittings into two parts. COMPOSITIONS: all.
+#: Compositions of the flows of parts of H. CORRECTED: compositions with a corrector, for near-integrable systems.
+#: NEAR_INTEGRABLE: all compositions for near-integrable systems. FLOW_COMPOSITIONS: NEAR_INTEGRABLE, and compositions
+#: for splittings into two parts. COMPOSITIONS: all compositions.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),
@@ -146,7 +147,8 @@ COMPOSITIONS = (
     "sofroniou-spaletta",
     *FLOW_COMPOSITIONS,
 )
-#: Name of a monitor for H = A + B. The splitting then integrates K = log(A + e) − log(−B), where e = −H(x₀).
+#: Name of the monitor for splittings of H = A + B. With this monitor, the splitting integrates K = log(A + e) −
+#: log(−B), where e = −H(x₀).
 LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
 #: Words for ``structure:`` of a Gauss method: its step is a Poisson map exactly, or up to the truncation error.

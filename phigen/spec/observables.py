@@ -15,7 +15,7 @@ from phigen.symbolic.expression import Expression
 
 #: Names of columns that every output may have; observables must have other names.
 RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
-#: For densities of bonds and of pairs: the relation between sites that they require, and how a spec declares it.
+#: The relation between sites that densities of bonds or of pairs require, and how a spec declares this relation.
 _RELATIONS = {"bonds": ("graph", "lattice: {graph: NAME}"), "pairs": ("pairs", "lattice: {pairs: all}")}
 
 
@@ -45,14 +45,17 @@ def observables(
 
 
 def _scope(reduction: Reduction | None, declared: Declarations) -> AllowedNames:
-    """Return the names that an observable may use. Densities of bonds and pairs use the names of their ends."""
+    """Return the names that an observable may use. Densities of bonds and pairs may use values at both ends."""
     of_bonds = reduction is not None and reduction.over != "sites"
     scope = declared.bond_scope(dated=True) if of_bonds else declared.dated_scope()
     return replace(scope, piecewise=True)
 
 
 def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> Reduction | None:
-    """Return the reduction of the density under an observable; None if it has none, or after reported errors."""
+    """Return how the density of an observable is reduced to one number.
+
+    Returns None for an observable without a reduction, and after errors, which are reported.
+    """
     kind = next((k for k in REDUCTIONS if entry.get(k) is not None), None)
     if kind is None:
         return None

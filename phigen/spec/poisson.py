@@ -1,4 +1,5 @@
-"""Reader of ``poisson:``: from the YAML nodes of a Poisson structure to its form, a record of `model.py`.
+"""Reader of ``poisson:``. It converts the YAML nodes of a Poisson structure to a form, which is a record of
+`model.py`.
 
 Sizes of matrices, names and repetitions are checked here; the Jacobi identity is checked later.
 """
@@ -45,9 +46,10 @@ def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm 
 
 
 def brackets_of_sites(raw: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
-    """Return the brackets {f, g} of fields at different sites of a lattice, neighbours on a grid or ends of a bond.
+    """Return the brackets {f, g} of fields at different sites of a lattice: neighbours on a grid, or ends of a
+    bond.
 
-    Keys are pairs of symbols (f, g). For each two symbols there is one key, (f, g) or (g, f).
+    Keys are pairs of symbols. For two symbols f and g, either (f, g) or (g, f) is a key.
     """
     if "bonds" in raw:
         return _along_bonds(raw["bonds"], declared)
@@ -153,7 +155,7 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     for key, row in table.values():
         i = declared.coordinate(key)
         for second_name, cell in (row or {}).values():
-            # The bracket with a neighbour x[i+1] is one between sites, which `brackets_of_sites` reads.
+            # A bracket with a neighbour x[i+1] is a bracket between sites. `brackets_of_sites` reads it.
             if "[" in second_name.text and declared.relation == "grid":
                 continue
             j = declared.coordinate(second_name)

@@ -80,7 +80,8 @@ class Problems:
     def add(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> None:
         """Record an error; a repeated message at the same place is ignored.
 
-        ``limit`` says that the error is an exceeded limit. Raises the exception when `limits.ERRORS` are recorded.
+        ``limit`` says that the error is an exceeded limit. When the number of errors reaches `limits.ERRORS`, the
+        exception with all errors is raised.
         """
         line = self.lines[location.line - 1] if location.line <= len(self.lines) else ""
         self.found.setdefault((location, message), Diagnostic(message, location, hint, line))
@@ -89,7 +90,7 @@ class Problems:
             raise self.error()
 
     def copy(self) -> Problems:
-        """Return a copy of the errors so far. `restore` can go back to it."""
+        """Return a copy of the errors so far, for `restore`."""
         twin = Problems(self.file)
         twin.found, twin.only_limits = dict(self.found), self.only_limits
         return twin
@@ -108,7 +109,9 @@ class Problems:
         return self.error()
 
     def error(self) -> SpecError:
-        """Return the exception with all errors; a `LimitError` if all of them are exceeded limits."""
+        """Return the exception with all errors. It is a `LimitError` if each error is an exceeded limit, else a
+        `SpecError`.
+        """
         ordered = [self.found[key] for key in sorted(self.found, key=lambda key: key[0])]
         if len(ordered) >= limits.ERRORS:
             ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def needs_quotes(line: str, column: int) -> bool:
-    """Whether a ``[`` directly after a name stands at this column (from 0), so that the YAML parser fails there."""
+    """Whether the character at this column (from 0) is a ``[`` directly after a name, where the YAML parser fails."""
     return column < len(line) and line[column] == "[" and (column > 0) and _ends_name(line[:column])
 
 
@@ -33,7 +33,7 @@ def _ends_name(text: str) -> bool:
 
 
 def _finished(part: str) -> str:
-    """Return a key or a value; with quotes, if it contains an index such as ``[i+1]`` and has no quotes yet."""
+    """Return a key or a value. If it contains an index such as ``[i+1]`` and has no quotes, quotes are added."""
     inner = part.strip()
     if "[" not in inner or inner[:1] in "\"'":
         return part

@@ -186,7 +186,7 @@ def _average(
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
     """Report an average that begins after the end of a run.
 
-    This is for runs whose steps are equal in physical time; with a monitor, the end is not known in advance.
+    The steps must be equal in physical time. With a monitor they are not, and the end is not known in advance.
     """
     start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
@@ -199,7 +199,8 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """Return the expression under ``section`` or ``stop`` (``key``), whose zeros a run finds.
+    """Return the expression under a key of a run, ``section`` or ``stop``. The run finds the zeros of this
+    expression.
 
     An expression that is constant along every run is reported.
     """
@@ -246,11 +247,10 @@ def _steps(
 def _steps_until(
     name: str, raw: Mapping[str, Any], span: Fraction, step: Fraction | None, declared: Declarations
 ) -> int | None:
-    """Return the number of whole steps in the time ``span`` from the start to ``until``; the number is at least
-    1.
+    """Return the number of whole steps in the time ``span`` from the start to ``until``, at least 1.
 
-    Returns None after errors, which are reported. With a monitor the steps are unequal in time, so that the number is
-    only an estimate.
+    Returns None after errors, which are reported. With a monitor the steps are unequal in time, so the number is only
+    an estimate.
     """
     if step is None:
         return None
@@ -267,7 +267,7 @@ def _steps_until(
 
 
 def whole(ratio: Fraction) -> int | None:
-    """Return a ratio of two times as an integer, the number of steps; None if it is not an integer.
+    """Return the ratio of two times as an integer, such as a number of steps; None if it is not an integer.
 
     A relative distance of `NEAR_INTEGER` from the integer is allowed, because decimals are rounded.
     """
@@ -372,7 +372,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
 
 
 def without_repetition(entries: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
-    """Return the words of a list, each once, without None; report words that occur twice.
+    """Return the words of a list without repetitions and without None. Words that occur twice are reported.
 
     ``path`` are the keys of the list in the spec.
     """

@@ -15,7 +15,7 @@ from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
-#: Keys under ``over`` that are settings of the sweep, not names of varied quantities, with the kinds of their values.
+#: Keys under ``over`` that are settings of the sweep, not quantities to vary. Each key has the kind of its value.
 _WORDS: Mapping[str, Kind] = {
     "random": Integer(1, limits.SWEPT, limit=True),
     "seed": Integer(0, limits.SWEEP_SEED, limit=True),
@@ -107,8 +107,8 @@ def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
 def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tuple[str, str] | None:
     """Return why a sweep cannot average observables over the rows of this run, and a hint; None if it can.
 
-    A sweep averages over states after whole steps, or over its frames. With a monitor, it does not know the physical
-    times of these states.
+    A sweep averages over states after whole steps, or over its frames. With a monitor, the physical times of these
+    states are unknown.
     """
     averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
     if averages and run.is_timed and not sweep.frames:

@@ -23,7 +23,8 @@ import in is lambda nonlocal not or pass raise return try while with yield match
 _KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
 
 # Headers of standard C, of POSIX, of the libraries of Linux, macOS and Windows, and of compilers. Other headers include
-# them as <NAME.h>. The names are in lower case, because some file systems find availability.h as <Availability.h>.
+# them as <NAME.h>. The names are in lower case: on some file systems, the file availability.h is also found by the name
+# <Availability.h>.
 _HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
 stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
 aio aliases alloca ar argp argz backtrace byteswap cpio crypt cxxabi dirent dlfcn elf endian envz err error execinfo
@@ -38,19 +39,20 @@ winsock2"""
 _HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
 _HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
 
-# Modules that programs import beside a generated module. Below, modules that the standard library has in some versions
-# of Python, but not in all.
+# _MODULES: modules that programs import together with a generated module. _OTHER_VERSIONS: modules of the standard
+# library that only some versions of Python have.
 _MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
 _OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
 
 _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 
-# Names X for which a C library has functions X_init, X_status, …. In a program that is linked with generated code, the
-# generated functions would be called instead.
+# Names X for which a C library has functions X_init, X_status, …. If X were the name of a spec, programs that are
+# linked with the generated code would call the generated functions instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: Last words of refused names of specs, with the symbol that would clash. NAME_default_params has the default
-#: parameters of the spec NAME; for a spec NAME_default, it would also be the type of its parameters.
+#: Last words of refused names of specs, with the symbol that would clash. For example, a spec NAME generates the symbol
+#: NAME_default_params for its default parameters. A spec NAME_default would generate the same symbol for the type of
+#: its parameters.
 CLASHING_ENDS = {
     "default": "default_params",
     "modified": "modified_hamiltonian",

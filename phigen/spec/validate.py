@@ -52,8 +52,8 @@ OPTIONS = {
 def validate(data: bytes, file: str) -> Spec:
     """Return the spec in the bytes of a file.
 
-    ``file`` is its name in messages. Raises `SpecError` with all errors, in the order of the file; `LimitError` if all
-    of them are exceeded limits.
+    ``file`` is its name in messages. Raises `SpecError` with all errors, in the order of the file. If each of these
+    errors is that the file exceeds a limit, the exception is a `LimitError`.
     """
     source = decode(data, file)
     problems = Problems(file, source)
@@ -69,7 +69,7 @@ def validate(data: bytes, file: str) -> Spec:
 def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     """Return the arguments of `Spec` by name. Values with errors are reported, and replaced by harmless ones.
 
-    ``raw`` is the content of the file by key, ``declared`` its names.
+    ``raw`` is the content of the file by key, and ``declared`` has the names that the file declares.
     """
     references = raw.get("references", ())
     poisson = raw.get("poisson", {})
@@ -144,17 +144,18 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     }
 
 
-#: Keys of the Hamilton–Jacobi series, which schemes without a series refuse. Each has the values that are allowed
-#: nevertheless, because they request nothing.
+#: Keys of the Hamilton–Jacobi series. Schemes without a series refuse these keys, except with the values that are
+#: listed here: they request nothing.
 SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
-#: Schemes that do not use the Hamilton–Jacobi series, each with a sentence for messages that says what it uses instead.
+#: Schemes that do not use the Hamilton–Jacobi series. For messages, each has a sentence on what the scheme uses
+#: instead.
 WITHOUT_SERIES = {
     "splitting": "scheme: splitting follows exact flows of parts of H",
     "gauss": "scheme: gauss solves for the stages of a collocation method",
 }
 
 
-#: Keys that lattices refuse. Each has the values that are allowed nevertheless, since they request nothing, and a hint.
+#: Keys that lattices refuse, except with the values that are listed here: they request nothing. Each key has a hint.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "order: sets the method of a lattice"),
@@ -163,7 +164,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 }
 
 
-#: Keys that are refused with noise. Each has the values that are allowed nevertheless, the reason, and a hint.
+#: Keys that are refused with noise, except with the values that are listed here. Each key has the reason and a hint.
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
@@ -232,7 +233,10 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
 
 
 def _no_brackets(declared: Declarations) -> MatrixForm:
-    """Return the zero matrix as π of a site, for lattices all of whose brackets are along bonds, and after errors."""
+    """Return the zero matrix as π of a site.
+
+    This is π of a site if all brackets of a lattice are along bonds. It also replaces a π with errors.
+    """
     n = len(declared.coordinates)
     return MatrixForm(((ZERO,) * n,) * n)
 
@@ -306,7 +310,8 @@ def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dic
 def _gauge(
     raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
-    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are subtracted from H.
+    """Return the value of ``gauge``: auto, none, or a multiple for each named Casimir. The multiples are subtracted
+    from H.
 
     The multiples must be constant along trajectories, so those that depend on coordinates are reported.
     """
@@ -398,8 +403,9 @@ def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationC
 def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
-    """Return the lists under the keys of a bi-realisation, each of n expressions in the coordinates and ``p_NAME``.
+    """Return the expressions in lists of a bi-realisation, such as ``alpha``, by the key of the list.
 
+    Each list has an expression for each coordinate. The expressions may use the coordinates and the momenta ``p_NAME``.
     ``where`` names the bi-realisation in messages.
     """
     n, scope, expressions = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}

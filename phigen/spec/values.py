@@ -32,7 +32,7 @@ _WHOLE_SPHERE = "initial: {random: sphere}"
 def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
     """Return the values at sites or bonds that a YAML value describes; None after errors, which are reported.
 
-    ``whole`` says that they are the initial values of all fields of a lattice together.
+    If ``whole``, the array has the initial values of all fields of a lattice together.
     """
     if raw is None:
         return None

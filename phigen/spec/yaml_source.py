@@ -27,12 +27,12 @@ class Node:
 
 @dataclass
 class Scalar(Node):
-    """A YAML scalar, as its text; ``plain`` means without quotes.
+    """A YAML scalar, as its text. It is ``plain`` if it has no quotes.
 
     ``offset`` is the number of columns from the location of the scalar to the first character of the text: 1 if there
-    is a quote, else 0. It is None for a text with escapes or over several lines, whose characters are not consecutive
-    columns. For a text over several lines without escapes, ``places`` has the line and the column of each character
-    that is not a blank, and of the end.
+    is a quote, else 0. It is None if the text has escapes or several lines, since then its characters are not in
+    consecutive columns. For a text of several lines without escapes, ``places`` has the line and the column of each
+    character that is not a blank, and of the end.
     """
 
     text: str
@@ -41,7 +41,9 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """Return the place of a character of the text in the file; if it is unknown, the place of the scalar."""
+        """Return the place in the file of the character ``index`` of the text. If it is unknown, return the place of
+        the scalar.
+        """
         here = self.location
         if self.offset is not None:
             return Location(here.line, here.column + self.offset + index, here.file)
@@ -173,7 +175,7 @@ def read(text: str, problems: Problems) -> Mapping:
     except MarkedYAMLError as error:
         raise builder.syntax_error(error) from None
     except (YAMLError, ValueError, OverflowError) as error:
-        # errors that ruamel raises as ValueError, for instance for an escape with an impossible number
+        # ruamel raises ValueError for some errors, for instance for an escape with an impossible number
         raise problems.stop(f"not valid YAML: {shown(error, 200)}", Location(1, 1, problems.file)) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.is_null):
@@ -197,12 +199,13 @@ class _Builder:
         self.documents = 0
 
     def place(self, mark: Any) -> Location:
-        """Return the location, counted from 1, of a mark of ruamel, which counts from 0."""
+        """Return the location of a mark of ruamel. Locations are counted from 1, marks from 0."""
         return Location(mark.line + 1, mark.column + 1, self.problems.file)
 
     def syntax_error(self, error: Any) -> Exception:
         mark = error.problem_mark or error.context_mark
-        # If the end of the file is reached, the place where the unfinished list or mapping starts is more helpful.
+        # If parsing fails at the end of the file, the message names the start of the unfinished list or mapping, which
+        # is more helpful.
         if error.context_mark and mark.index >= len(self.text):
             mark = error.context_mark
         location = self.place(mark) if mark else Location(1, 1, self.problems.file)
@@ -212,7 +215,7 @@ class _Builder:
             hint = "indent with spaces, not with tabs"
         line = self.text.split("\n")[location.line - 1]
         if needs_quotes(line, location.column - 1):
-            self.problems.forget(location.line)  # drops earlier errors of this line, consequences of the missing quotes
+            self.problems.forget(location.line)  # earlier errors of this line follow from the missing quotes
             what = "inside { } and [ ], what contains [ ] stands between quotes"
             hint = f"write {quoted(line).strip()}"
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
@@ -293,7 +296,7 @@ class _Builder:
         return (*places, (places[-1][0], places[-1][1] + 1))
 
     def attach(self, node: Node) -> None:
-        """Add a node to the innermost list or mapping that is being read; there it is an item, a key or a value."""
+        """Add a node to the innermost list or mapping that is being read, as an item, a key or a value."""
         if not self.stack:
             self.root = node
             return
