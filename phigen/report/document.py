@@ -19,7 +19,7 @@ from phigen.report.precision import precision_section
 from phigen.report.system import system_section
 from phigen.report.viewer import viewer
 
-#: Largest number of characters of the spec that are shown.
+#: Largest number of characters of the spec that the page shows.
 SOURCE = 100_000
 
 

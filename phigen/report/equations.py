@@ -1,4 +1,4 @@
-"""Equations of a page: shown, folded or left out according to their size."""
+"""Equations of a page. Depending on their size, they are shown, folded or left out."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Limits of the size of a group of formulas, which is the number of names and numbers in it. The page folds groups
-#: larger than FOLDED, and leaves out groups larger than LEFT_OUT.
+#: The size of a group of formulas is the number of names and numbers in it. The page folds groups larger than FOLDED,
+#: and leaves out groups larger than LEFT_OUT.
 FOLDED, LEFT_OUT = 160, 4_000
-#: Largest number of terms of a polynomial that the page contains; longer ones are abbreviated.
+#: Largest number of terms of a polynomial that the page contains completely.
 MOST_TERMS = 150
 
 
@@ -29,7 +29,8 @@ def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str
 def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, sign: str = "=") -> Markup:
     """Return equations as HTML. ``left`` contains the left-hand sides as MathML.
 
-    Common subexpressions get names. Long groups are folded, or left out; then ``subject`` is their title.
+    Common subexpressions get names. A large group of equations is folded under the title ``subject``. A very large one
+    is replaced by a note, which begins with ``subject``.
     """
     formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:
@@ -43,7 +44,7 @@ def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, 
 
 
 def polynomial(left: str, formula: Formula) -> Markup:
-    """Return one equation; a long polynomial is abbreviated, and all of its terms can be unfolded."""
+    """Return one equation. A long polynomial is abbreviated; up to `MOST_TERMS` terms can be unfolded."""
     if formula.size <= SHOWN + 1:
         return page.equations([equation(left, formula)])
     cut = replace(formula, terms=formula.terms[:SHOWN], hidden=formula.size - SHOWN)

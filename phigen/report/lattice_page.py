@@ -30,9 +30,9 @@ from phigen.symbolic.arrays import Floats
 class LatticeMaterial:
     """Content of the page of a lattice. Without a run, trajectory and verification are None.
 
-    ``errors`` (frames,) are the errors of conserved quantities, by name; ``energies`` (frames, *sizes) are the energies
-    of the sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum`` contains
-    Lyapunov exponents.
+    ``errors`` maps the names of conserved quantities to their errors (frames,). ``energies`` (frames, *sizes) are the
+    energies of the sites. ``failure`` is the reason if the run is incomplete. ``live`` is the live panel, ``spectrum``
+    contains Lyapunov exponents.
     """
 
     examination: Examination

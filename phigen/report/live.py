@@ -22,8 +22,8 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders that the panel offers in addition to the order of the page; and largest number of characters of the JavaScript
-#: for all orders together.
+#: ORDERS: orders that the panel offers in addition to the order of the page. MOST: largest number of characters of the
+#: JavaScript for all orders together.
 ORDERS, MOST = (2, 4), 200_000
 #: FEW: groups with at most this number of sliders are shown unfolded. COORDINATES: largest number of coordinates with
 #: sliders. STEP, SPEED, PARAMETER: largest factors by which sliders change the step, the speed and a parameter.
@@ -44,7 +44,8 @@ _PRIVATE = Extras(without=frozenset({"ensemble"}))
 
 @dataclass(frozen=True)
 class Live:
-    """Content of the live panel of a run: solvers in JavaScript by order, parameters, and functions of the invariants.
+    """Content of the live panel of a run: a solver in JavaScript for each order, parameters, and functions that compute
+    the invariants.
 
     If there is no panel, ``why_not`` is the reason.
     """
@@ -91,10 +92,11 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """Return the solvers in JavaScript (order → text), and "", for the order of the page and for ``orders``.
+    """Return the solvers in JavaScript (order → text), and "". If there can be no solvers, return {} and the
+    reason.
 
-    If there can be no solvers, the mapping is empty, and the text is the reason. ``spec`` replaces the spec of the
-    compilation, from which it may differ only in its observables.
+    The orders are the order of the page, and ``orders``. ``spec`` replaces the spec of the compilation, from which it
+    may differ only in its observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
@@ -118,8 +120,8 @@ def solvers(
 
 
 def emits(compilation: Compilation) -> bool:
-    """Return whether the panel can run the solver of the page as it is. Otherwise the panel needs a compilation of its
-    own.
+    """Return whether the panel can run the solver of the page without changes. If not, the panel needs another
+    compilation.
     """
     extras = replace(compilation.program.extras, included=frozenset())
     return not compilation.spec.reconstruct and extras in (NO_EXTRAS, _PRIVATE)
@@ -128,7 +130,7 @@ def emits(compilation: Compilation) -> bool:
 def enclosed(module: str) -> str:
     """Return the text of a JavaScript function that contains a generated module.
 
-    The function returns the names of the module that the panel uses. Comments of the module are left out.
+    The function returns the parts of the module that the panel uses. Comments of the module are left out.
     """
     code = _COMMENT.sub("", module).replace("export class", "class")
     lines = (line.strip() for line in code.splitlines())
@@ -216,7 +218,8 @@ def slid(slider: Slider) -> Markup:
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
     """Return the texts of the two halves of the panel, for phigen and for RK4.
 
-    Each entry has the number of the colour, the id of the canvas, the name of the method, and id and text of the label.
+    Each entry has the colour (as a number), the id of the canvas, the name of the method, and the id and the text of
+    the label.
     """
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
@@ -251,7 +254,7 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _casimir_label(system: System, casimirs: Mapping[str, int]) -> str:
-    """Return the label for errors of the Casimirs in a mapping from names to indices."""
+    """Return the label for errors of Casimirs. ``casimirs`` maps their names to indices."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
@@ -268,8 +271,8 @@ def _groups(system: System) -> list[Group]:
 def _leaf(system: System, group: Group) -> int | None:
     """Return the index of the Casimir whose level surface is drawn; None if no surface is drawn.
 
-    The Casimir depends only on the three coordinates of the group. For a system of two coordinates, the level curve of
-    the energy is drawn instead, and the result is −1.
+    The group has three coordinates, and the Casimir depends on these coordinates only. If the system has two
+    coordinates, the level curve of the energy is drawn instead, and the result is −1.
     """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None

@@ -35,9 +35,9 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: Limits of the sizes that the panel offers. These are the sizes of the run, halved and doubled several times. FEWEST
-#: is the least number of sites along an axis; the others are the largest numbers of sites of systems of pairs, of
-#: chains, and of other lattices.
+#: The panel offers the sizes of the run, halved and doubled several times, within these limits. FEWEST: least number of
+#: sites along an axis. MOST_PAIRS, MOST_IN_CHAIN and MOST_SITES: largest numbers of sites in systems of pairs, in
+#: chains and in other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 #: Largest total number of values in the lists that a page contains: initial values, parameters and bonds.
 MOST_NUMBERS = 20_000
@@ -172,10 +172,9 @@ def _picture(compilation: CompiledLattice, start: Start) -> str:
 
 
 def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, list[int]]]:
-    """Return the quantities that can be drawn.
+    """Return the quantities that can be drawn, as entries of name, kind and indices.
 
-    Each entry has a name, the kind of quantity ("field", "direction", "observed" or "energy"), and the indices of
-    fields or observables.
+    The kind is "field", "direction", "observed" or "energy". The indices select fields or observables.
     """
     fields = compilation.spec.coordinates
     if picture == "moving":
@@ -192,8 +191,8 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
     """Return the sizes that the panel offers, in ascending order.
 
-    If the run has a graph, or takes an initial value or a parameter from a list or a file, only the sizes of the run
-    are offered.
+    There is no choice for a run with a graph, or with a list or a file for an initial value or a parameter. Then the
+    panel offers only the sizes of the run.
     """
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))

@@ -1,4 +1,4 @@
-"""Content of a page. Collecting it takes most of the time; see `phigen.cli.report_material`."""
+"""Content of a page; `phigen.cli.report_material` collects it, which takes most of the time of `phigen report`."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from phigen.symbolic.arrays import Floats
 class Material:
     """Proofs of a spec and measurements on one run. Missing parts are None, and ``notes`` give the reasons.
 
-    ``steps`` describes the steps of the run. ``methods`` are trajectories by the labels of methods; the solver comes
-    first. If the rows of ``methods`` are several steps apart, ``opening`` has trajectories of the first steps, with
-    every step. ``section`` consists of the function whose zeros define the Poincaré section, of some points (rows,
-    DIM), and of the number of all points. ``spectrum`` contains the Lyapunov exponents. ``constancy`` measures the
-    modified Hamiltonian along the run; if it is missing, ``no_constancy`` is the reason. ``environment`` describes the
-    conditions under which times were measured. ``command`` is the command that writes the page again.
+    ``steps`` describes the steps of the run. ``methods`` maps the labels of methods to their trajectories; the solver
+    comes first. If the rows of ``methods`` are several steps apart, ``opening`` has trajectories of the first steps,
+    with a row for every step. ``section`` has three parts: the function whose zeros define the Poincaré section, some
+    of the points (rows, DIM), and the number of all points. ``spectrum`` contains the Lyapunov exponents. ``constancy``
+    measures the modified Hamiltonian along the run; if it is missing, ``no_constancy`` is the reason. ``environment``
+    describes the conditions under which times were measured. ``command`` is the command that writes the page again.
     """
 
     examination: Examination

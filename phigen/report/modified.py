@@ -12,8 +12,9 @@ from phigen.study.backward import Constancy, truncation
 
 
 def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
-    """Return the section with the measured changes of the modified Hamiltonian, as a table and a figure, or with the
-    reason why they were not measured.
+    """Return the section on the modified Hamiltonian.
+
+    It shows the measured changes as a table and a figure, or the reason why they were not measured.
     """
     explanation = (
         "A step of the solver agrees to all orders in h with the exact flow, over the time h, of a Hamiltonian H̃ near "

@@ -1,8 +1,8 @@
 """HTML of pages: blocks made from templates, and the page around the blocks.
 
 Text of specs is untrusted, so templates escape it; only text that this package has built is `Markup`. The page declares
-a Content-Security-Policy. It forbids all access to the network, and allows only the style sheet and the scripts of the
-page, which it identifies by their hashes.
+a Content-Security-Policy, which forbids all access to the network. The policy allows only the style sheet and the
+scripts of the page; their hashes identify them.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ Cell = tuple[str, str]
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: Scripts of the live panel, which stand after the JavaScript of its solvers: CURVES for ordinary systems, FIELDS for
-#: lattices.
+#: Scripts of the live panel: CURVES for ordinary systems, FIELDS for lattices. They stand after the JavaScript of the
+#: solvers.
 CURVES = ("race.js", "start.js", "curves.js", "live.js")
 FIELDS = ("race.js", "start.js", "fields.js", "live.js")
 
@@ -47,7 +47,7 @@ def _environment() -> jinja2.Environment:
 
 
 def block(template: str, **values: object) -> Markup:
-    """Render ``templates/report/TEMPLATE.html.jinja`` with values, which are escaped unless they are `Markup`."""
+    """Render ``templates/report/TEMPLATE.html.jinja`` with values. Values are escaped unless they are `Markup`."""
     return Markup(_environment().get_template(f"{template}.html.jinja").render(values))
 
 

@@ -23,7 +23,7 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Largest number of drawn rows of a trajectory, and largest number of drawn Casimirs.
+#: ROWS: largest number of drawn rows of a trajectory. CASIMIRS: largest number of drawn Casimirs.
 ROWS, CASIMIRS = 3_000, 11
 
 
@@ -56,8 +56,8 @@ def error_picture(material: Material) -> Markup:
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
     """Return the figure of the Poincaré section.
 
-    The figure shows some of the ``count`` crossings. ``function`` is the function whose zeros define the section, as
-    text.
+    The figure shows some of the ``count`` crossings. ``function`` is the text of the function whose zeros define the
+    section.
     """
     shown_points = points[:: max(1, -(-len(points) // ROWS))]
     caption = f"Poincaré section: {count} points where {function} rises through zero"

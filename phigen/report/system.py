@@ -10,7 +10,7 @@ from phigen.report import page
 from phigen.report.equations import group
 from phigen.report.known import MOTION
 
-#: Matrices with more than ROWS rows, or more than ENTRIES names and numbers, are shown as brackets.
+#: A matrix π with more than ROWS rows, or with more than ENTRIES names and numbers, is shown as a list of brackets.
 ROWS, ENTRIES = 6, 90
 
 

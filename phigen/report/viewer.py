@@ -17,8 +17,8 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: MOST_NUMBERS: largest number of values in all curves. MOST_ROWS: largest number of rows of a curve. STEPS:
-#: coordinates are rounded to integers from 0 to this number.
+#: MOST_NUMBERS: largest number of values in all curves together. MOST_ROWS: largest number of rows of a curve. STEPS:
+#: coordinates are stored as integers from 0 to this number.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
 #: Largest number of curves in the viewer.
 CURVES = 2
@@ -31,9 +31,9 @@ def viewer(
 ) -> Markup:
     """Return the viewer of the first two trajectories; empty if no curve can be drawn.
 
-    If the rows of the whole run are too far apart to be joined by lines, the viewer shows ``opening``, the first steps
-    of the same methods. If the level set of one of the ``casimirs`` is a surface or a curve in the axes that are shown
-    at first, the level set is drawn too.
+    If the rows of the whole run are too far apart to be joined by lines, the viewer shows ``opening`` instead: the
+    first steps of the same methods. The level set of a Casimir is drawn too, if it is a surface or a curve in the axes
+    that are shown at first.
     """
     first = next(iter(methods.values()), None)
     if first is None:
@@ -69,9 +69,10 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Return curves (points, 3) on the leaf of the trajectory, separated by rows of NaN; None if there is no leaf.
+    """Return lines on the level set of a Casimir on which the trajectory stays; None if there is no such surface or
+    curve.
 
-    The three columns are the coordinates on the ``axes``.
+    The result (points, 3) has the coordinates on the three ``axes``. Rows of NaN separate the lines.
     """
     if not drawable() or len(curve.coordinates) in axes:
         return None
@@ -112,7 +113,7 @@ def _integer_columns(points: Floats) -> list[list[int | None]]:
 
 
 def _finite(trajectory: Trajectory) -> Any:
-    """Return the rows before the first state that is not finite. The columns are the coordinates, and the time last."""
+    """Return the rows before the first state that is not finite. The columns are the coordinates, and then the time."""
     nonfinite_rows = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
     end = int(nonfinite_rows[0]) if len(nonfinite_rows) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
@@ -121,7 +122,7 @@ def _finite(trajectory: Trajectory) -> Any:
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
     """Return the indices of the three columns that are shown at first.
 
-    These are the coordinates of the largest group; if the group has fewer than three, other coordinates or the time are
+    These are coordinates of the largest group. If this group has fewer than three, other coordinates or the time are
     added.
     """
     group = max(groups(coordinates), key=len)

@@ -14,8 +14,8 @@ function unitOf(quantity, x) {
   return value > 1e-3 * terms ? value : terms || 1;
 }
 
-// Coordinate i at the fraction s of the way between two states, by the cubic polynomial that has the values
-// and slopes of both states.
+// Coordinate i between the states a and b, at the fraction s of the step. The cubic polynomial has the
+// values and slopes of both states.
 function between(a, b, s, i) {
   const r = 1 - s;
   return r * r * (1 + 2 * s) * a.x[i] + r * r * s * a.slope[i] + s * s * (3 - 2 * s) * b.x[i] - s * s * r * b.slope[i];
@@ -49,7 +49,7 @@ function makeView(panel) {
   const spaces = sides.map((side) => inSpace(at(side), view, () => panel.draw(), reset));
   let bounds, net;
 
-  // Return a comparison (class Race) of a new solver with RK4, which measures the errors of conserved
+  // Return a comparison (class Race) of a new solver with RK4. It measures the errors of conserved
   // quantities. If the solver refuses the settings, its error is thrown.
   function begin({ Solver, rateAt }, given) {
     const solver = new Solver({ x0: given.start, t0: data.t0, params: given.params });
@@ -186,8 +186,8 @@ function makeView(panel) {
     write(end(v, v.high), left - 5, 10, "right", "top");
   }
 
-  // Return the trail of one method's run as points on the screen. Of the last step, only the part is drawn
-  // that has been shown so far.
+  // Return the trail of one method's run as points on the screen. Of the last step, the trail contains
+  // only the part that the animation has reached.
   function trailOf(runner, axes, place) {
     const points = [], { trail } = runner, { waiting } = panel, parts = 6;
     for (let k = 1; k < trail.length; k++) {

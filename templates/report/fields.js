@@ -62,7 +62,7 @@ function makeView(panel) {
   const countOf = (sizes) => sizes.reduce((product, n) => product * n, 1);
   let low, high, table, ground;
 
-  // Return a comparison (class Race) of a new solver with RK4, which measures the errors of conserved
+  // Return a comparison (class Race) of a new solver with RK4. It measures the errors of conserved
   // quantities. If the solver refuses the settings, its error is thrown.
   function begin({ Solver }, given) {
     const sizes = sizesOf(given), count = countOf(sizes), params = { ...given.params };
@@ -83,9 +83,9 @@ function makeView(panel) {
     return (x) => Math.abs(solver.hamiltonian(x) - energy) / unit;
   }
 
-  // Return a function that computes the largest error of some Casimirs. If each site has a Casimir, this is
-  // the error at the worst site. If a Casimir is a sum over the sites, its error is relative to the
-  // magnitudes of the terms.
+  // Return a function that computes the largest relative error of some Casimirs. For a Casimir of each
+  // site, this is the error at the worst site, relative to the mean magnitude. For a sum over the sites,
+  // the error is relative to the sum of the magnitudes; for a product, to the value at the start.
   function offCasimirs(solver, chosen) {
     const first = solver.casimirs(), { count } = solver.sites, kinds = solver.constructor.CASIMIR_KINDS;
     const units = kinds.map((_, k) => first.subarray(k * count, (k + 1) * count).reduce((sum, v) => sum + Math.abs(v), 0) || 1);

@@ -27,8 +27,9 @@ if (document.getElementById("live-panel")) {
     else into[kind] = value;
   }
 
-  // The value that a slider sets. Its positions go from -100 to 100. Depending on its scale, the position is
-  // the exponent of a factor, or it is proportional to the difference from the usual value.
+  // The value that a slider sets. The position of a slider, from -100 to 100, is divided by 100. On the
+  // scale "log", the result is the exponent of the factor `reach`. Otherwise `reach` times the result is
+  // added to the usual value.
   function valueOf(input) {
     const { kind, name, reach } = input.dataset, place = Number(input.value) / 100, usual = get(standard, kind, name);
     if (lists[kind]) return lists[kind][Number(input.value)];
@@ -99,8 +100,8 @@ if (document.getElementById("live-panel")) {
       const allowed = only ? positive : nonnegative ? (v) => v >= 0 : () => true;
       number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
-    // A link contains the number of steps of RK4 for each step of the solver, so that its reader sees what
-    // its sender saw.
+    // A link contains the number of steps of RK4 for each step of the solver. So a reader who opens the
+    // link sees the same comparison.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return { found, refused: [...refused, ...[...unknown].map((key) => `${key}=${parts.get(key)}`)] };

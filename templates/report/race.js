@@ -3,12 +3,12 @@
 const MOST = 400; // largest number of intervals in a History, and of steps in a trail
 const MOST_PARTS = 64; // largest number of steps of RK4 for one step of the solver
 const ROUNDING = 1e-13; // errors below this are rounding errors, which are not compared
-// The ratio of the largest error in the second half of a run to that in the first: an error is constant if
-// the ratio is at most STEADY, and grows if it is more than GROWING.
+// Bounds for a ratio: the largest error in the second half of a run divided by that in the first half. An
+// error is constant if the ratio is at most STEADY, and grows if it is more than GROWING.
 const STEADY = 1.2, GROWING = 1.5;
 
-// The largest error in each of several equal intervals of a run. If there are too many intervals, every two
-// of them are joined.
+// The largest error in each of several equal intervals of a run. If there are too many intervals,
+// neighbouring intervals are joined in pairs.
 class History {
   values = [];
   last = 0;
@@ -95,8 +95,8 @@ class Race {
   }
 }
 
-// The time in milliseconds that one step of one method takes: the shortest of several measurements, each of
-// which takes `round` milliseconds; 0 if the step fails.
+// The time in milliseconds that one step of one method takes; 0 if the step fails. It is the shortest of
+// several measurements, each of which takes `round` milliseconds.
 function millisecondsOf(runner, round) {
   let least = Infinity;
   try {

@@ -133,8 +133,9 @@ function inSpace(canvas, view, redraw, reset) {
   return { pen, begin, placed, box, curve, turn };
 }
 
-// For axes {low, high}: their middles, the half-lengths by which they are scaled, and their half-lengths
-// after scaling (`reach`). Axes of similar lengths have the same scale.
+// Return numbers that place axes {low, high} in the picture: their middles, the half-lengths by which
+// they are scaled, and their half-lengths after scaling (`reach`). Axes of similar lengths have the same
+// scale.
 function framed(axes) {
   const spans = axes.map(({ low, high }) => high - low);
   const largest = Math.max(...spans), shared = spans.every((s) => 4 * s > largest);

@@ -8,19 +8,19 @@ const MARGIN = 0.03; // largest error of phigen's solver with the initial settin
 const CHORD = 0.8; // largest distance between successive states, relative to the size of the picture
 const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if possible
 const DOUBLED = 14; // largest number of step sizes to try; each is twice the previous one
-const BETTER = 1.2, CLEAR = 4; // best scores must grow by the factor BETTER; the search ends above CLEAR
+const BETTER = 1.2, CLEAR = 4; // a better score is larger by the factor BETTER; the search ends above CLEAR
 
 function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, costOf = (race) => equalWork(race, 1) }) {
-  // The number of steps of RK4 for each step of the solver: one, or the number that takes the same time in
-  // this browser. The time is measured once for each order and size and for similar steps, so that the number
+  // The number of steps of RK4 for each step of the solver: one, or the number that takes as long in this
+  // browser. Times are measured once for each order and size and for similar steps, so that the number
   // does not change while a slider moves.
   const measured = {};
   const alike = ({ order, sites, h }) => [order, sites, Math.round(2 * Math.log2(Math.abs(h)))].join();
   const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= costOf(begin({ ...given, parts: 1 }))));
   const remember = (given, parts) => { measured[alike(given)] = parts; };
 
-  // The comparison with RK4 after `steps` steps, or after fewer steps if these take longer than `limit`
-  // milliseconds. watch(runner) is called for each state of phigen's solver.
+  // The comparison with RK4 after `steps` steps, or earlier if it takes longer than `limit` milliseconds.
+  // watch(runner) is called for each state of phigen's solver.
   function tried(given, steps, limit, watch = () => {}) {
     const trial = begin(given), { ours } = trial, end = performance.now() + limit;
     watch(ours);
@@ -36,20 +36,21 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
   // Whether the errors of the solver are still small with twice the step.
   const hasMargin = (given) => worst(tried({ ...given, h: 2 * given.h }, 100, 60).ours) < 0.5;
 
-  // A score for the visible advantage of the solver over RK4: a sum of two terms. The first is the share of
-  // the groups of quantities in which RK4 does not have smaller errors. The second is the ratio of the
-  // largest error of RK4 to that of the solver, where only visible differences count; it is negative if RK4
-  // has smaller errors.
+  // A score for the visible advantage of the solver over RK4. One term is the share of those groups of
+  // quantities in which RK4 does not have smaller errors. The other term is the largest error of RK4
+  // divided by that of the solver, where only visible differences count. This term is negative if the
+  // largest error of RK4 is smaller.
   function advantage(race) {
     const [ours, theirs] = [worst(race.ours), worst(race.theirs)], closer = groupsOfRk4(race).length;
     const seen = theirs > ours ? Math.min(theirs, FAR) / Math.max(ours, VISIBLE) : -Math.min(1, ours / MARGIN) / 2;
     return 1 - closer / race.groups.length + seen;
   }
 
-  // Settings of one order with which the errors of the solver are small, even with twice the step. The first
-  // step is that of the run, or a fraction of it if necessary. Each further step is twice the previous one.
-  // The last is the first with which RK4 fails, or the last with which the solver is accurate and the motion
-  // can be followed. There is at least one setting.
+  // Settings of one order with which the errors of the solver are small, even with twice the step. The
+  // first step is that of the run, or a fraction of it if necessary. Each further step is twice the
+  // previous one. Smaller steps are left out while the motion is slow. The list ends after the first
+  // setting with which RK4 fails, or before the solver becomes inaccurate, or before the motion is too
+  // fast to follow. The list has at least one setting.
   function stepsOf(given, end) {
     let h = data.step;
     const at = (step) => ({ ...given, h: step }), steps = [];

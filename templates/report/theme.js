@@ -1,6 +1,5 @@
 "use strict";
-// The page follows the theme of the system, light or dark, until the reader presses the button, which
-// switches to the other theme.
+// The page follows the theme of the system, light or dark. The button switches to the other theme.
 {
   const root = document.documentElement;
   const button = document.getElementById("theme");

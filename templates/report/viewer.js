@@ -16,8 +16,8 @@ if (document.getElementById("viewer")) {
   const value = (c, axis, i) => scaled(axis, data.curves[c][axis][i]);
   const axes = () => selects.map((s) => Number(s.value));
 
-  // Return the row of curve `c` that has the time of row `row` of the first curve, or the next row if no row
-  // has this time.
+  // Return the row of curve `c` at the time of row `row` of the first curve. If no row has this time,
+  // return the next later row.
   function sameTime(c, row) {
     const times = data.curves[c].at(-1), i = times.findIndex((t) => t >= data.curves[0].at(-1)[row]);
     return i < 0 ? times.length - 1 : i;
