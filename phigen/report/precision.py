@@ -37,10 +37,10 @@ def _conditions(study: Study) -> str:
         else "There was no C compiler: all methods ran in Python with NumPy, so times are mostly the interpreter's"
     )
     return (
-        f"{note}. Each time is the fastest of {study.rounds} repetitions, in which the methods take turns. The set-up "
-        f"of the solver, once per trajectory, took {page.scientific(study.set_up)} s, not counted in the times. Over "
+        f"{note}. Each time is the fastest of {study.rounds} repetitions, in which the methods take turns. The times "
+        f"do not include the set-up of the solver, which took {page.scientific(study.set_up)} s for a trajectory. Over "
         "a short time, explicit methods of high order often need less time for the same error of the solution, but "
-        "their errors of Casimirs and energy are not smaller than that error."
+        "their errors of Casimirs and energy are not smaller than this error."
     )
 
 
