@@ -189,8 +189,7 @@ def _plan(
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
     """Yield changes that remove generated files whose spec no longer exists.
 
-    Nothing is removed unless a whole folder is built, since a build of single specs does not know which other specs
-    exist.
+    A build of single specs removes nothing, since it does not know which other specs exist.
     """
     from phigen.cli.outputs import orphans
 

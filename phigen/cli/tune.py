@@ -70,9 +70,9 @@ def command(
 ) -> None:
     """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy, for lattices too.
 
-    phigen builds candidates as C (without a compiler: as NumPy), and measures error and time of each over a part of a
-    run. The best are measured again over the whole run if the time limit allows. phigen prints lines to paste into the
-    spec. Classical methods are measured for comparison. Exit code 5 if nothing reaches the accuracy.
+    phigen builds candidates as C, or as NumPy if there is no compiler, and measures error and time of each over a part
+    of a run. The best candidates are measured again over the whole run if the time limit allows. phigen prints lines to
+    paste into the spec. Classical methods are measured for comparison. Exit code 5 if nothing reaches the accuracy.
     """
     from phigen.api import chosen_target
     from phigen.compiler import compile_proved
