@@ -1,7 +1,7 @@
-"""Kinds of values in a spec: each kind reads a node and describes itself as JSON Schema.
+"""Kinds of values in a spec. Each kind can read a node and describe itself as JSON Schema.
 
 `fields.py` builds the table of the format from kinds. The validator and the schema are both made from that table.
-Reading checks the shape only: the text of an expression stays a `Scalar` node, which is parsed later, when the declared
+Reading checks the shape only. The text of an expression stays a `Scalar` node, which is parsed later, when the declared
 names are known. A value with an error is reported and read as None, which is never a valid value.
 """
 

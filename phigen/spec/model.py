@@ -172,11 +172,11 @@ class BirealisationChoice:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """Options of ``solver:``, for the solution of implicit equations in a step and for the code of steps.
+    """Options of ``solver:``. They concern the solution of implicit equations, and the code of steps.
 
-    ``method`` is auto or newton; ``tolerance`` is None if phigen chooses it. ``lanes`` says whether the C uses SIMD
-    lanes for steps and for members of ensembles; without lanes the code is shorter and slower. ``compensated`` says
-    whether the C for lattices uses compensated summation of the steps.
+    ``method`` is auto or newton. If ``tolerance`` is None, phigen chooses the tolerance. ``lanes`` says whether the C
+    uses SIMD lanes for steps and for members of ensembles; without lanes the code is shorter and slower.
+    ``compensated`` says whether the C for lattices uses compensated summation of the steps.
     """
 
     method: str = "auto"
@@ -190,11 +190,11 @@ class SolverOptions:
 class Extras:
     """Parts of the generated code that are optional.
 
-    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` is a number of correction
-    terms: if it is not 0, the function ``modified_hamiltonian`` is added, and computes H plus these terms. ``without``
-    are parts to leave out (`phigen.spec.names.PARTS`); ``included`` are parts to include although the profile leaves
-    them out. ``adjoint`` adds the transposed derivative of a step and of a run, with respect to state and parameters.
-    ``real`` is the number type of the C, double or float.
+    ``tangent`` adds ``step_tangent``, the derivative of a step. If ``modified_hamiltonian`` is not 0, a function of
+    this name is added. It computes H plus this number of correction terms. ``without`` has parts to leave out
+    (`phigen.spec.names.PARTS`). ``included`` has parts to include although the profile leaves them out. ``adjoint``
+    adds the transposed derivative of a step and of a run, with respect to state and parameters. ``real`` is the number
+    type of the C, double or float.
     """
 
     tangent: bool = False
@@ -444,9 +444,9 @@ class Lattice:
 
 @dataclass(frozen=True)
 class SpecForces:
-    """Forces of ``forces:`` and ``damping:``, as in ẋ = π(∇H + ζ + λ π∇H) + f.
+    """Forces of ``forces:`` and ``damping:``, for the equation ẋ = π(∇H + ζ + λ π∇H) + f.
 
-    ``covector`` has the nonzero components of ζ by coordinate, ``vector`` those of f; ``damping`` is λ.
+    ``covector`` has the nonzero components of ζ by coordinate, and ``vector`` those of f. ``damping`` is λ.
     """
 
     covector: Mapping[str, Expression] = field(default_factory=dict)

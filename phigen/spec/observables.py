@@ -24,8 +24,8 @@ def observables(
 ) -> tuple[dict[str, Expression], dict[str, Reduction]]:
     """Return the expressions of ``observables``, and the reductions of observables of lattices to one number.
 
-    Observables, coordinates and Casimirs are columns of the output, so an observable with the name of a coordinate or a
-    Casimir is reported.
+    Observables, coordinates and Casimirs are columns of the output. So an observable must not have the name of a
+    coordinate or a Casimir.
     """
     used_names = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
     used_names |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}

@@ -278,8 +278,8 @@ def whole(ratio: Fraction) -> int | None:
 def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
     """Return the run with another step, which may be negative.
 
-    A run keeps its ``until`` or ``duration``, if it states one, otherwise the number of its steps. If the step does not
-    divide the duration, the last step is shorter if ``parts`` is true; otherwise `ValueError` is raised.
+    A run that states ``until`` or ``duration`` keeps it. Other runs keep the number of their steps. If the step does
+    not divide the duration, the last step is shorter if ``parts`` is true; otherwise `ValueError` is raised.
     """
     if run.until is not None:
         ratio = (run.until - run.start) / step
