@@ -128,10 +128,11 @@ class CSolver:
         return members.checked(final if frames is None else frames, failures)
 
     def _expect_parameters(self, members: Members) -> None:
-        """Raise `BackendError` if no step is possible with the parameters. This is called for an ensemble without
+        """Raise `BackendError` if no step is possible with the parameters. Called for ensembles without
         members.
 
-        With a monitor (rescaled time: dt = g dτ) nothing is checked, since the sign of g depends on the initial state.
+        With a monitor g (rescaled time: dt = g dτ) nothing is checked, since the sign of g depends on the initial
+        state.
         """
         if hasattr(self._c, "monitor"):
             return

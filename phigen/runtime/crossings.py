@@ -34,8 +34,8 @@ BLOCK = 64
 #: Number of intervals into which a step with a collocation polynomial is divided. g is evaluated at the ends of the
 #: intervals. Four intervals suffice to find the extrema of a motion that makes half a turn in a step.
 SAMPLES = 4
-#: g on a collocation polynomial is differentiated by a central difference, between points at this distance before and
-#: after. The distance is a fraction of a step: about the cube root of the machine epsilon.
+#: g on a collocation polynomial is differentiated by a central difference. Its two points lie before and after the zero
+#: at this distance, as a fraction of a step: about the cube root of the machine epsilon.
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
@@ -334,8 +334,8 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the zero of g in a step, as the fraction of the step and a session at the zero; None if none
-        is found.
+        """Return the zero of g in a step as a pair: the fraction of the step, and a session at the zero. Return None
+        without a zero.
 
         Newton's method starts from the zero on the collocation polynomial. The iteration may not converge at a double
         zero of g.

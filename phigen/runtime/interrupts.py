@@ -14,8 +14,8 @@ _QUESTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 @contextmanager
 def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
-    """Return a context in which Ctrl-C ends a call of C early. At the end of the context, `KeyboardInterrupt` is
-    raised.
+    """Return a context in which Ctrl-C ends a call of C early. `KeyboardInterrupt` is then raised at the end of the
+    context.
 
     At the beginning, ``ask`` is called with the address of a C function that returns nonzero after Ctrl-C. The C must
     call this function from time to time. At the end, ``ask`` is called with None.

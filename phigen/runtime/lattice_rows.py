@@ -46,8 +46,8 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Return a few numbers that identify these rows. A run resumes from a checkpoint only if it has the same
-        numbers.
+        """Return a few numbers that identify these rows. To be resumed, a run must have the same numbers as its
+        checkpoint.
         """
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]

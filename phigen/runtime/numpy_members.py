@@ -144,8 +144,8 @@ class MemberBatch:
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
 
     def _of_step(self) -> tuple[Any, ...]:
-        """Return arguments for the stages of the next step: time, step size and, if the system has noise, its
-        increments.
+        """Return arguments for the stages of the next step: time, step size and, with noise, increments of the
+        noise.
         """
         time_and_step = self._t0 + self._done * self._h, self._h
         return (*time_and_step, self._drawn(self._done)) if hasattr(self._module, "_drawing") else time_and_step

@@ -2,8 +2,8 @@
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
 run``. The line is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
-figures, films and pages. A ``.csv`` cannot contain the line, since some programs would read it as data. The line is
-then in the file ``FILE-metadata.json`` beside the ``.csv``. This is the place for metadata in the W3C recommendation
+figures, films and pages. A ``.csv`` cannot contain the line, since some programs would read it as data. It is in the
+file ``FILE-metadata.json`` beside the ``.csv`` instead. This is the place for metadata in the W3C recommendation
 "Metadata Vocabulary for Tabular Data".
 """
 

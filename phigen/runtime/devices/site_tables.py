@@ -1,5 +1,5 @@
-"""Arrays that a lattice has on a device besides its state: neighbours, bonds, parameters at sites, selections
-of sites.
+"""Tables of sites, arrays that a lattice has on a device: neighbours, bonds, parameters at sites, selections of
+sites.
 """
 
 from __future__ import annotations
