@@ -1,7 +1,7 @@
 """The named Lie algebras of specs, for every size: basis, order of the basis, and faithful real matrices.
 
-E_ij is the matrix with a single 1 in row i, column j. With ``sign: plus``, {x_i, x_j} = Σ c_ij^k x_k for the constants
-[E_i, E_j] = Σ c_ij^k E_k below; ``sign: minus`` negates all brackets.
+E_ij is the matrix with a single 1, in row i and column j. The table has the bases E_1, E_2, … of the algebras. Let
+[E_i, E_j] = Σ c_ij^k E_k. With ``sign: plus``, {x_i, x_j} = Σ c_ij^k x_k; ``sign: minus`` negates all brackets.
 
 ================ ============================================================================================
 so(3)            L_1, L_2, L_3 with [L_1, L_2] = L_3 and cyclic (L_k v = e_k × v). The free rigid body in the

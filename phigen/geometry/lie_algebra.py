@@ -1,7 +1,8 @@
 """Lie algebras, given by structure constants, with faithful matrices if these are known.
 
 The structure constants c_ij^k are defined by [E_i, E_j] = Σ_k c_ij^k E_k. On the dual, {x_i, x_j} = Σ_k c_ij^k x_k.
-With ``sign: minus`` in a spec, all c_ij^k are negated; this algebra is represented by the matrices −ρ(E_i).
+With ``sign: minus`` in a spec, all c_ij^k are negated. If matrices ρ(E_i) represent an algebra, then −ρ(E_i) represent
+the algebra with the negated constants.
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ Nφ(−N)x. It has these closed forms:
 
 In the last case φ(−N) = φ(s) − φ'(s)(N + s) plus terms with the factor (N + s)², whose product with N is 0. The number
 s is a quadratic polynomial in p. For so(3), where Nx = p×(p×x), it is |p|²; for sl(2), minus the discriminant; for
-se(3), the squared rotation rate. It follows from the structure constants: if −s is the only nonzero eigenvalue of N,
-and m is its multiplicity, then s = −tr N/m.
+se(3), the squared rotation rate. This s follows from the structure constants: if −s is the only nonzero eigenvalue of
+N, and m is its multiplicity, then s = −tr N/m.
 """
 
 from __future__ import annotations
