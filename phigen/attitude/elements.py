@@ -59,10 +59,10 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 
 
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
-    """Return the element with the quaternion (1 − sφ, p/2), s = |p|², before the division by lengths, for any value of
-    φ.
+    """Return the element with the quaternion (1 − sφ, p/2), where s = |p|² and φ has any value.
 
-    φ = 0 gives the Cayley transform. In the result, ``length`` is the square of the length of the quaternion.
+    The element is not yet divided by lengths. φ = 0 gives the Cayley transform. In the result, ``length`` is the square
+    of the length of the quaternion.
     """
     s = dot(p, p)
     c = ONE - s * phi
@@ -88,12 +88,12 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 
 
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
-    """Return exp(r), or exp(r, t) with a translation, minus 1, for a rotation vector r of any length.
+    """Return exp(r) − 1 or, with a translation t, exp(r, t) − 1, for a rotation vector r of any length.
 
     For a rotation about a coordinate axis without translation, the quaternion is (1, tan(|r|/2)) with the tangent along
-    the axis. It is not of unit length; products of elements are normalised at the end of a step. This form is the
-    cheapest, since the flow computes sin and cos of the angle |r| anyway. With a translation, the quaternion uses sin
-    and 1 − cos of half the angle, as the increments of the flow then do (see
+    the axis. This quaternion is not of unit length; products of elements are normalised at the end of a step. This form
+    is the cheapest, since the flow computes sin and cos of the angle |r| anyway. With a translation, the quaternion
+    uses sin and 1 − cos of half the angle. The increments of the flow then use the same functions (see
     `phigen.attitude.flow_elements.by_angles`).
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]

@@ -137,8 +137,8 @@ class _SortedAxes:
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols x_i, w_i and S.
 
-    All expressions vanish if the group element is that of the flow, provided that x' is the momentum after the flow.
-    The identities of `phigen.splitting.euler` prove this. The time derivative of S is CD.
+    All expressions vanish if the group element is that of the flow and x' is the momentum after the flow. The
+    identities of `phigen.splitting.euler` prove the second condition. The time derivative of S is CD.
     """
     yield from _shortest_rotation()
     for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of one of these
@@ -166,10 +166,10 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield a label and an expression that vanishes if the angle θ of this module has the time derivative that this
-    module states.
+    """Yield a label and an expression for the angle θ.
 
-    ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest E_i.
+    This module states formulas for θ and for θ̇. The expression vanishes if the time derivative of the first is the
+    second. ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest E_i.
     """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")

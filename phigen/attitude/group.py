@@ -215,7 +215,7 @@ def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
 def _signed(e: Expression, spatial: bool) -> Expression:
     """Return an entry of a generator with the sign of the convention for momenta in the body or in space.
 
-    The known matrices represent the bracket if elements are multiplied from the left, for momenta in space; otherwise
-    their negatives do.
+    The known matrices represent the bracket for momenta in space, where elements are multiplied from the left. For
+    momenta in the body, the negatives of these matrices represent the bracket.
     """
     return e if spatial else -ONE * e

@@ -99,9 +99,9 @@ class Packs:
     """Members of an ensemble with explicit steps, in batches with one member in each lane.
 
     ``kernels`` are the kernels of a step, or of the flows of a splitting. ``small_argument`` are the functions that
-    have a polynomial for small arguments; beyond its range, a version for all arguments is called. ``transposes`` are
-    the transposed kernels if cotangents are pulled back in lanes too. Then the reverse pass takes ``reverse_packs``
-    batches of members together. If ``recomputed``, a transpose computes the state before a flow by the inverse flow.
+    have a polynomial for small arguments. For larger arguments, a version for all arguments is called. ``transposes``
+    are the transposed kernels, if the reverse pass uses lanes too. It takes ``reverse_packs`` batches of members
+    together. If ``recomputed``, a transpose computes the state before a flow by the inverse flow.
     """
 
     kernels: tuple[Kernel, ...]
@@ -181,8 +181,9 @@ def in_lanes(program: Program) -> Lanes | None:
 def _is_lowered(program: Program) -> bool:
     """Whether several steps of a trajectory, or several members, may be computed together in lanes.
 
-    They may not with noise: coefficients then differ from step to step, so that predictors from earlier steps fail. If
-    H depends on the time, coefficients differ as well; then lanes are used only for implicit steps without a monitor.
+    This is not possible with noise: coefficients then differ from step to step, so that predictors from earlier steps
+    fail. If H depends on the time, coefficients differ as well; then lanes are used only for implicit steps without a
+    monitor.
     """
     dated = program.time and (program.monitor or not program.step.kind.implicit)
     return program.lanes and program.offers("lanes") and not program.noise and not dated

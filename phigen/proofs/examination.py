@@ -92,7 +92,7 @@ def refutation(examination: Examination) -> str:
 def hint_of(spec: Spec, group: str) -> str:
     """Return a hint at the usual cause if a statement of this group is refuted, or "".
 
-    A function that is no Casimir may be due to coordinates whose order differs from the basis of the named algebra.
+    If a function is no Casimir, the coordinates may be in another order than the basis of the named algebra.
     """
     form = spec.poisson
     if group == DAMPING:
@@ -105,8 +105,9 @@ def hint_of(spec: Spec, group: str) -> str:
 
 
 def doubts(examination: Examination) -> list[Diagnostic]:
-    """Return warnings, with places in the spec, about expressions that seem to be undefined, everywhere or at the start
-    of a run.
+    """Return warnings about expressions that seem to be undefined, everywhere or at the start of a run.
+
+    Each warning has its place in the spec.
     """
     messages = [
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))

@@ -73,12 +73,11 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """Yield comparisons of both derivations: of S_1 … S_``terms``, by default all terms of the method, then of ∇S_h, α
-    and β.
+    """Yield comparisons of both derivations: first of S_1 … S_``terms``, then of ∇S_h, α and β.
 
-    ∇S_h of the program is compared only if no further S_i is needed for it. If steps follow paths, α and β have no
-    closed form, and are compared only through the S_i. Raises `LimitError` after ``seconds``, or if a polynomial has
-    too many terms.
+    By default, all terms of the method are compared. ∇S_h of the program is compared only if no further S_i is needed
+    for it. If steps follow paths, α and β have no closed form, and are compared only through the S_i. Raises
+    `LimitError` after ``seconds``, or if a polynomial has too many terms.
     """
     terms = terms or compilation.stage.terms
     derivation: _Derivation | None = None
@@ -220,8 +219,10 @@ class _Derivation:
         return Agreement(statement, None, time.perf_counter() - start)
 
     def _pushes(self) -> dict[Any, Any]:
-        """Return the terms that forces and noise add to ∇S_h, by coordinate: hζ for a force ζ, ΔW σ∇g for a source of
-        noise."""
+        """Return the terms that forces and noise add to ∇S_h, by coordinate.
+
+        A force with the covector ζ adds hζ. A source of noise with the Hamiltonian g adds ΔW σ∇g.
+        """
         system, dictionary = self._compilation.system, self._dictionary
         pushes = dict.fromkeys(dictionary.coordinates, sympy.Integer(0))
         for c, zeta in zip(dictionary.coordinates, system.forces.covector if system.forces else (), strict=False):

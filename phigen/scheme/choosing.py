@@ -144,8 +144,8 @@ def planned(
 ) -> ScheduledMethod:
     """Return the splitting method for the ``requested`` order, as `plan` does, for a spec or a system.
 
-    ``kicks_of`` returns the parts that can be the V of a Nyström method; it is called only if a Nyström method is
-    considered.
+    ``kicks_of`` returns the parts that can be V in H = T + V for a Nyström method. It is called only if a Nyström
+    method is considered.
     """
     even_order = requested + requested % 2
     note = "" if even_order == requested else f"order {requested} was asked for; a symmetric method has even order"

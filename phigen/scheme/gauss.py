@@ -217,8 +217,10 @@ def _lifted_step(step: Gauss, lifted: tuple[Kernel, Kernel, Lift], coefficients:
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """Return the record of a monitored solver with the kernels of dt/dτ and of the physical time t of a step; None
-    without a monitor."""
+    """Return the record of a monitored solver; None without a monitor.
+
+    The record has the kernel of dt/dτ, and that of the physical time t of a step.
+    """
     if gauge.monitor is None:
         return None
     level = level_adjoint(system) if spec.extras.adjoint else None
@@ -228,7 +230,7 @@ def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
     """Return the kernel with the whole table of coefficients as its input.
 
-    Before, its input is the part of the table that existed when the kernel was built.
+    Its input so far is the part of the table that existed when the kernel was built.
     """
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named

@@ -72,10 +72,9 @@ def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the contribution of a stage to the physical time t of a step: its weight times dt/dτ at the
-    stage.
+    """Return the kernel of the physical time t that one stage contributes to a step.
 
-    τ is the time of the monitor, in which steps have equal size.
+    This time is the weight of the stage times dt/dτ. τ is the time of the monitor, in which steps have equal size.
     """
     (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
     return Kernel(

@@ -30,7 +30,8 @@ from phigen.symbolic.symbols import Symbol, kind_of
 #: the integral of the unknown z_k up to the stage.
 READ = "u"
 
-#: Symbols of the time of a stage since the start of the step, as a fraction of the step, and of the step size.
+#: Two symbols. The first is the time of a stage since the start of the step, as a fraction of the step. The second is
+#: the step size.
 TIME, LENGTH = Symbol("stage_time"), Symbol("stage_step")
 
 

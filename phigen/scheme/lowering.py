@@ -65,7 +65,8 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """Return base^(1/degree) by square roots and at most one cube root, which other powers of the base can share.
+    """Return base^(1/degree) as square roots and at most one cube root; other powers of the base can share
+    them.
 
     Returns None if ``degree`` is not 2^n or 3·2^n.
     """

@@ -64,7 +64,7 @@ def _flow(system: System, source: Source) -> Flow:
 
 
 def driving_times(system: System) -> list[Expression]:
-    """Return for each source of noise the duration σ ΔW of its flow in half a step; all have one symbol ΔW."""
+    """Return for each source of noise the duration σ ΔW of its flow in half a step; all share one symbol ΔW."""
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 

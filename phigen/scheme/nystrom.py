@@ -1,10 +1,10 @@
 """Splitting methods for H = T + V with {V, {V, {V, T}}} = 0: methods of Runge–Kutta–Nyström type, also with modified
 potentials.
 
-A step alternates flows of T and V: Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h} with t_i = t_{n+1−i}. Because of the condition, the
-times t_i need to satisfy fewer order conditions than for arbitrary T and V. If V + κ{V, {V, T}} has an elementary flow
-too, each flow of V (a kick) may use a multiple κ_i = m_i h². The m_i are further unknowns of the order conditions
-(`phigen.splitting.kicks`).
+A step is Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h} with t_i = t_{n+1−i}, where the φ are flows of T and of V by turns. Because of
+the condition {V, {V, {V, T}}} = 0, the times t_i need to satisfy fewer order conditions than for arbitrary T and V. If
+V + κ{V, {V, T}} has an elementary flow too, this flow may take the place of each flow of V (a kick), with κ_i = m_i h².
+The m_i are further unknowns of the order conditions (`phigen.splitting.kicks`).
 """
 
 from __future__ import annotations

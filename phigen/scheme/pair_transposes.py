@@ -52,7 +52,7 @@ def transposed_at_ends(
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
     """Return a transposed kernel with 0 in place of the cotangents that do not belong to the site at ``end``.
 
-    The cotangents of parameters of bonds and of shared values are computed for the end b only.
+    Other cotangents, such as those of parameters of bonds, are computed for the end b only.
     """
     outputs = []
     for o in kernel.outputs:

@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. On lattices there is an input of the same name. It
-#: has those fields after the flow that the kernel needs for this output only.
+#: Name of an output of a transposed flow: the state before the flow. On lattices an input has the same name. It holds
+#: those fields after the flow that the kernel reads for this output only.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1

@@ -15,8 +15,8 @@ from phigen.symbolic.expression import ZERO, gradient
 #: respect to y at the same site.
 _BLOCK = "own_slope"
 
-#: Selections of the cotangents that a transposed kernel computes. The first entry of a pair says whether those of
-#: fields are computed, the second whether all others are.
+#: Selections of the cotangents that a transposed kernel computes. The first entry of a pair says whether it computes
+#: those of fields, the second whether it computes all others.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
 #: Transposed kernels of a stage in the order of the reverse pass, with the kernels that they transpose. The first one

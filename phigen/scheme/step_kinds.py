@@ -1,7 +1,8 @@
 """The kinds of steps: a record for each kind, with the properties that other packages need.
 
-A step (`phigen.scheme.steps`) has a kind and kernels. A package that treats kinds differently has a table with an entry
-for each kind: `phigen.lanes.in_lanes` for steps in SIMD lanes, and a module of each target for the printed code.
+A step (`phigen.scheme.steps`) has a kind and kernels. Packages that treat kinds differently have tables with an entry
+for each kind: `phigen.lanes.in_lanes` has one for steps in SIMD lanes, and a module of each target has one for the
+printed code.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""Properties of the sweeps of a lattice from which targets choose their code: band elimination, wavefront blocking,
-reverse passes."""
+"""Properties of the sweeps of a lattice. They decide which code targets print: for band elimination, wavefront blocking
+and reverse passes.
+"""
 
 from __future__ import annotations
 
@@ -77,10 +78,10 @@ def site_blocks(program: Program, step: Sweeps) -> bool:
 
 
 def waves(program: Program, step: Sweeps) -> bool:
-    """Whether wavefront blocking applies: to splittings on grids with several flows in a step, in the profile
-    ``fast``.
+    """Whether wavefront blocking applies.
 
-    Flows on grids read only neighbours. There must be neither noise nor boundary seams.
+    It applies to splittings on grids with several flows in a step, in the profile ``fast``, if there are neither noise
+    nor boundary seams. On grids a flow reads only neighbours, as wavefront blocking requires.
     """
     is_splitting = step.equation is None and step.partners is None and not step.sites.seams
     return is_splitting and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
@@ -103,9 +104,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether the cotangents that a flow passes to other sites of a grid are added by the loop of the next flow.
+    """Whether the loop of the next flow adds the cotangents that a flow passes to other sites of a grid.
 
-    Otherwise separate loops add them. This is used in the profile ``fast`` only, since the code is long.
+    Otherwise separate loops add them. Loops that add cotangents have long code, and are used in the profile ``fast``
+    only.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
@@ -136,8 +138,8 @@ def ways(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether the transposed sweeps add contributions of each site to sums over all sites: to the cotangents of
-    coefficients or of parameters.
+    """Whether the transposed sweeps compute sums over all sites, such as the cotangents of coefficients or
+    parameters.
     """
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)

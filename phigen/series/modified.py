@@ -2,15 +2,15 @@
 
 A step of size h is the flow, over the time h, of a formal series H̃_h = H_0 + h H_1 + h² H_2 + … with H_0 = H. The
 generating function of H̃_h is the solution of the Hamilton–Jacobi equation without truncation. At the time h it must be
-S_h = h S_1 + … + h^k S_k, the generating function of the method; the H_j follow from this condition. At the time σh,
-0 ≤ σ ≤ 1, the solution for H̃_h is S(σ) = Σ h^r s_r(σ) with
+S_h = h S_1 + … + h^k S_k, the generating function of the method; the H_j follow from this condition. At the time σh
+with 0 ≤ σ ≤ 1, the solution for H̃_h is S(σ) = Σ h^r s_r(σ). Its terms satisfy
 
     ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0.
 
-The condition is s_r(1) = S_r for r ≤ k and s_r(1) = 0 for r > k, a linear equation for each H_{r−1}. The first
+The condition is s_r(1) = S_r for r ≤ k and s_r(1) = 0 for r > k. It gives a linear equation for each H_{r−1}. The first
 correction is −h^k S_{k+1}. In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does H̃_h: on
-the right H̃_h is evaluated at τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. For canonical
-structures, see E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX.
+the right H̃_h is evaluated at τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. For
+canonical structures, see E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX.
 """
 
 from __future__ import annotations
@@ -130,15 +130,15 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """Return the coefficient of h^k in τ − σh/2, the time at the beginning, as {symbol of τ: coefficient}.
+        """Return the coefficient of h^k in τ − σh/2, as {symbol of τ: coefficient}.
 
-        The dictionary is empty if H does not depend on the time.
+        τ − σh/2 is the time at the beginning of the step. The dictionary is empty if H does not depend on the time.
         """
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 
     def _integral(self, element: Poly) -> Poly:
-        """Return the integral of an element, a polynomial in σ, from 0 to σ."""
+        """Return the integral, from 0 to σ, of an element that is a polynomial in σ."""
         integrated: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             e = int(m[self.fraction]) + 1
@@ -146,7 +146,7 @@ class _ModifiedRecursion:
         return self.tower.context.from_dict(integrated)
 
     def _at_one(self, element: Poly) -> Poly:
-        """Return the value of an element, a polynomial in σ, at σ = 1."""
+        """Return the value, at σ = 1, of an element that is a polynomial in σ."""
         collected: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             key = (*m[: self.fraction], 0, *m[self.fraction + 1 :])

@@ -1,7 +1,7 @@
 """Second derivation, by sympy, of the maps α and β of Karasev's bi-realisation, to check the compiler.
 
-For constant p, a path m(s), 0 ≤ s ≤ 1, solves dm/ds = π(m)p. Let x be its mean, and m(s) = x + m_1(s) + m_2(s) + … with
-m_k of degree k in p. Then
+For constant p, a path m(s) with 0 ≤ s ≤ 1 solves dm/ds = π(m)p. Let x be its mean, and m(s) = x + m_1(s) + m_2(s) + …
+with m_k of degree k in p. Then
 
     dm_k/ds = part of degree k of Σ_ν π_ν(x)p (m_1 + … + m_{k−1})^ν,    π_ν = ∂^ν π(x)/ν!,
     ∫₀¹ m_k ds = 0.
@@ -53,7 +53,7 @@ def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Se
 
 
 def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
-    """Return the antiderivative of ``velocity`` with respect to s whose mean over 0 ≤ s ≤ 1 is 0."""
+    """Return the antiderivative of ``velocity`` in s that has the mean 0 over 0 ≤ s ≤ 1."""
     time, rational = functions.element(s), sympy.QQ
     return functions.expression(
         functions.total(
