@@ -1,6 +1,7 @@
 """Generated C with other compilers, for other machines and for WebAssembly, as docs/platforms.md describes."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from support import WARNINGS, compiled, files, run, setting, solver, tool, write
 from walkthrough import follow
 
 from phigen.runtime import toolchain
+from phigen.targets.reserved import WINDOWS_MACROS
 
 pytest.importorskip("ziglang")
 
@@ -86,6 +88,24 @@ def test_the_newest_clang_has_no_warning(name, tmp_path):
 @pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos", "aarch64-linux-musl", "wasm32-wasi"])
 def test_c_compiles_for_other_systems(target, sources):
     run([*ZIG, "-target", target, "-std=c99", "-O2", *WARNINGS, "-c", "rigid_body.c", "-o", f"{target}.o"], sources)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["heisenberg", "rigid_body", "kepler_eccentric"])
+def test_c_compiles_after_windows_h(name, tmp_path):
+    """windows.h defines far, near and other common words as macros, some of them empty."""
+    write(tmp_path, files(compiled(name), "c"))
+    write(tmp_path, {"main.c": f'#include <windows.h>\n#include "{name}.h"\n#include "{name}.c"\n'})
+    run([*ZIG, "-target", "x86_64-windows-gnu", "-std=c99", "-Werror", "-c", "main.c", "-o", "a.o"], tmp_path)
+
+
+@pytest.mark.slow
+def test_macros_of_windows_are_reserved():
+    """The list of the module is part of the macros of windows.h, except those of headers that it leaves out."""
+    command = [*ZIG, "-target", "x86_64-windows-gnu", "-x", "c", "-dM", "-E", "-"]
+    text = subprocess.run(command, input="#include <windows.h>", capture_output=True, text=True, check=True).stdout
+    defined = set(re.findall(r"^#define (\w+)(?!\S)", text, re.MULTILINE))
+    assert WINDOWS_MACROS - defined <= {"small"}
 
 
 @pytest.mark.slow

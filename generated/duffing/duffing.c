@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 2862372d2781237642ad84c0150ce2b1c429ab2facfbafc9445793b0e946b79b
+ * body-sha256: 646d1c0d1c9c0939c622666c80c3bbf1fdc4a85c3cb1338d66d5c1b5c01cd9dc
  */
 #include "duffing.h"
 #include <float.h>
@@ -146,14 +146,14 @@ static int duffing_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int duffing_advance(duffing_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int duffing_advance(duffing_solver *s, const double *change, const double *rest)
 {
     double x[duffing_DIM], carry[duffing_DIM];
     for (int i = 0; i < duffing_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -299,12 +299,12 @@ static duffing_status duffing_attempt(duffing_solver *s)
         const int stalled = previous < duffing_NEARLY_SOLVED && size > duffing_SHRINKING * previous;
         previous = size;
         if (!(remaining <= duffing_TOLERANCE || stalled)) continue;
-        double small[duffing_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
+        double rest[duffing_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < duffing_DIM; ++i)
-            for (int j = 0; j < duffing_DIM; ++j) small[i] -= slope[i * duffing_DIM + j] * delta[j];
-        for (int i = 0; i < duffing_DIM; ++i) small[i] += s->carry[i];
+            for (int j = 0; j < duffing_DIM; ++j) rest[i] -= slope[i * duffing_DIM + j] * delta[j];
+        for (int i = 0; i < duffing_DIM; ++i) rest[i] += s->carry[i];
         if (!duffing_plausible(s, increment)) return duffing_NO_CONVERGENCE;
-        if (!duffing_advance(s, increment, small)) return duffing_NOT_FINITE;
+        if (!duffing_advance(s, increment, rest)) return duffing_NOT_FINITE;
         duffing_remember(&s->history, y);
         return duffing_OK;
     }

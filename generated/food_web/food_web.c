@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 4ddc2caea1c334de3ac72f202106c8970af57b41f9fa278c7b9017e46089d69e
+ * body-sha256: 227f855ade61a0b0718c38cda3c4921beb1b92fe1de8347ced9185615af7e437
  */
 #include "food_web.h"
 #include <limits.h>
@@ -515,21 +515,22 @@ food_web_status food_web_step(food_web_solver *s, double h) { return food_web_in
 
 void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }
 
-size_t food_web_saved(const food_web_solver *s, double *x, size_t *far)
+size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range)
 {
-    *far = s->far;
+    *full_range = s->full_range;
     if (!s->open) return 0;
     food_web_take(s, s->before, x);
     return food_web_DIM;
 }
 
-food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far)
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,
+    size_t full_range)
 {
     if (s == NULL || (fields > 0 && (fields != food_web_DIM || x == NULL || !food_web_finite(x,
         fields * s->sites))))
         return food_web_BAD_ARGUMENT;
     if (food_web_set_step(s, h) != food_web_OK) return food_web_BAD_ARGUMENT;
-    s->far = far;
+    s->full_range = full_range;
     for (size_t k = 0; k < fields; ++k) food_web_put(s, s->before[k], x + k * s->sites);
     s->open = fields > 0;
     return food_web_OK;

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 70bda28b63af76e6220d473b44379c5b1e90694c2daaafbf44d234d936b87560
+ * body-sha256: 02bf014a453d75c1d592471d440559a3906230496e0d1ccde4131751f60fe7e7
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -47,7 +47,7 @@ typedef struct {
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */
@@ -83,11 +83,12 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *far, and arrays
-   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
+/* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range, and
+   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
    compensated steps. To restore, call food_web_init, then food_web_resume with these values. */
-size_t food_web_saved(const food_web_solver *s, double *x, size_t *far);
-food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far);
+size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range);
+food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,
+    size_t full_range);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

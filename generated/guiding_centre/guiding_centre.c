@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 3cff0f4beb640cd116b00a48c62d316f02b8087f8677c9b466d301bac5b495a6
+ * body-sha256: 1f39002e826d187d47a9c66a65956fa2067b987f2f7083a6974861225b7874f2
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -125,14 +125,14 @@ static int guiding_centre_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int guiding_centre_advance(guiding_centre_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int guiding_centre_advance(guiding_centre_solver *s, const double *change, const double *rest)
 {
     double x[guiding_centre_DIM], carry[guiding_centre_DIM];
     for (int i = 0; i < guiding_centre_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -488,7 +488,7 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
 {
     double series[guiding_centre_SERIES][guiding_centre_TERMS + 1], fixed[guiding_centre_FIXED],
         end[guiding_centre_DIM], slope[guiding_centre_DIM], norm = 0.0;
-    int small = 0;
+    int small_terms = 0;
     for (int i = 0; i < guiding_centre_DIM; ++i) {
         series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
@@ -507,8 +507,8 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
             const double measure = fabs(start[i]) + fabs(change[i]) + guiding_centre_LEAST_SHARE * norm;
             if (!(fabs(term) <= guiding_centre_NEGLIGIBLE * measure)) negligible = 0;
         }
-        small = negligible ? small + 1 : 0;
-        if (small >= 2 && guiding_centre_holds(coef, p, end, slope)) return 1;
+        small_terms = negligible ? small_terms + 1 : 0;
+        if (small_terms >= 2 && guiding_centre_holds(coef, p, end, slope)) return 1;
     }
     return 0;
 }

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 66e6aec393aa9863923c07ba38183ec639569e00f030901e1502b2a7fac3c78a
+ * body-sha256: acf9c5b55ffc4f742730d0415f2a2e73b330e6cee9f487e227fa67466a9627f0
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -182,8 +182,8 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
 static inline double heisenberg_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
-    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
-    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    const double reduced = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
+    const double r = reduced - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* bits of shifted; the last bit is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
@@ -244,7 +244,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
 }
 
 /* As heisenberg_sweep1_near, with full-range functions. */
-static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row)
+static inline void heisenberg_sweep1_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     const double *restrict x_row = row->x[0] + row->at[0];
@@ -292,7 +292,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
 }
 
 /* As heisenberg_sweep2_near, with full-range functions. */
-static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row)
+static inline void heisenberg_sweep2_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0], *z_row = row->x[2] + row->at[0];
@@ -340,7 +340,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
 }
 
 /* As heisenberg_sweep3_near, with full-range functions. */
-static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row)
+static inline void heisenberg_sweep3_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
     const double *restrict B_row = row->x[3] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
@@ -364,11 +364,12 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
 }
 
 /* The flow of H_1, with full-range functions, for the row segments first ... end - 1. */
-static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+static void heisenberg_rows1_full_range(const heisenberg_solver *s, const double *coef, size_t first,
+    size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
         heisenberg_row row = heisenberg_piece_of(s, unit);
-        heisenberg_sweep1_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_sweep1_full_range(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
         heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
         heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
@@ -386,11 +387,12 @@ static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef
 }
 
 /* The flow of H_2, with full-range functions, for the row segments first ... end - 1. */
-static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+static void heisenberg_rows2_full_range(const heisenberg_solver *s, const double *coef, size_t first,
+    size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
         heisenberg_row row = heisenberg_piece_of(s, unit);
-        heisenberg_sweep2_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_sweep2_full_range(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
         heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
         heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
@@ -408,11 +410,12 @@ static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef
 }
 
 /* The flow of H_3, with full-range functions, for the row segments first ... end - 1. */
-static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+static void heisenberg_rows3_full_range(const heisenberg_solver *s, const double *coef, size_t first,
+    size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
         heisenberg_row row = heisenberg_piece_of(s, unit);
-        heisenberg_sweep3_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_sweep3_full_range(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
         heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
         heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
     }
@@ -430,20 +433,20 @@ static void heisenberg_rows3_near(const heisenberg_solver *s, const double *coef
 }
 
 /* The flow of a part of H, for the row segments first ... end - 1. */
-static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const double *coef, int far,
+static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const double *coef, int full_range,
     size_t first, size_t end)
 {
     switch (part) {
     case 1:
-        if (far) heisenberg_rows1_far(s, coef, first, end);
+        if (full_range) heisenberg_rows1_full_range(s, coef, first, end);
         else heisenberg_rows1_near(s, coef, first, end);
         break;
     case 2:
-        if (far) heisenberg_rows2_far(s, coef, first, end);
+        if (full_range) heisenberg_rows2_full_range(s, coef, first, end);
         else heisenberg_rows2_near(s, coef, first, end);
         break;
     default:
-        if (far) heisenberg_rows3_far(s, coef, first, end);
+        if (full_range) heisenberg_rows3_full_range(s, coef, first, end);
         else heisenberg_rows3_near(s, coef, first, end);
         break;
     }
@@ -691,13 +694,13 @@ static void heisenberg_copy(double *const *to, double *const *from, const heisen
 /* ---- The flows ---- */
 enum { heisenberg_STRETCH = 32 }; /* steps between checks for finite values */
 /* number of steps with functions for arguments of any size, after a step that needed them */
-enum { heisenberg_FAR_STEPS = 64 };
+enum { heisenberg_FULL_RANGE_STEPS = 64 };
 
 /* Apply the flow of one part of H; called by all threads together. */
-static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
+static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int full_range)
 {
     size_t first, end = heisenberg_share(heisenberg_units(s), &first);
-    heisenberg_sweep_rows(s, part, coef, far, first, end);
+    heisenberg_sweep_rows(s, part, coef, full_range, first, end);
     heisenberg_wait();
 }
 
@@ -720,7 +723,7 @@ static void heisenberg_apply_flow(const heisenberg_solver *s, size_t steps, int 
 {
     heisenberg_flow flow;
     heisenberg_set_flow(s, steps, number, &flow);
-    heisenberg_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    heisenberg_sweep_part(s, flow.part, flow.coef, s->full_range > 0);
 }
 
 /* ---- Wavefront (temporal) blocking ---- */
@@ -753,7 +756,7 @@ static void heisenberg_make_slices(const heisenberg_solver *s, const heisenberg_
     const size_t rows = s->rows / s->sizes[0];
     from *= rows;
     to *= rows;
-    heisenberg_sweep_rows(s, flow->part, flow->coef, s->far > 0, from, to);
+    heisenberg_sweep_rows(s, flow->part, flow->coef, s->full_range > 0, from, to);
 }
 
 /* Apply some flows as one block. */
@@ -787,7 +790,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
             heisenberg_set_flow(s, s->steps + done / each, joined ? heisenberg_FLOWS : number, flows + count);
         }
         if (count > 1) heisenberg_make_wave(s, flows, count);
-        else heisenberg_sweep_part(s, flows->part, flows->coef, s->far > 0);
+        else heisenberg_sweep_part(s, flows->part, flows->coef, s->full_range > 0);
     }
 }
 
@@ -818,10 +821,10 @@ static int heisenberg_try(heisenberg_solver *s, size_t steps)
 static int heisenberg_close(heisenberg_solver *s)
 {
     if (heisenberg_try(s, 0)) return 1;
-    const size_t far = s->far;
-    s->far = 1;
+    const size_t full_range = s->full_range;
+    s->full_range = 1;
     const int done = heisenberg_try(s, 0);
-    s->far = far;
+    s->full_range = full_range;
     return done;
 }
 
@@ -832,18 +835,18 @@ static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (s->far > 0 && s->far < now) now = s->far;
+        if (s->full_range > 0 && s->full_range < now) now = s->full_range;
         if (!heisenberg_try(s, now)) {
-            if (now == 1 && s->far > 0) return heisenberg_NOT_FINITE;
+            if (now == 1 && s->full_range > 0) return heisenberg_NOT_FINITE;
             /* the fast functions give NaN if an argument is too large */
-            if (now == 1) s->far = heisenberg_FAR_STEPS;
+            if (now == 1) s->full_range = heisenberg_FULL_RANGE_STEPS;
             stretch = now > 1 ? 1 : heisenberg_STRETCH;
             continue;
         }
         heisenberg_copy(s->before, s->x, s);
         s->steps += now;
         s->open = heisenberg_FLOWS > 1;
-        s->far -= s->far > 0 ? now : 0;
+        s->full_range -= s->full_range > 0 ? now : 0;
     }
     return heisenberg_OK;
 }
@@ -906,26 +909,26 @@ heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenbe
     heisenberg_put_parameters(s, params);
     s->prepared = 0; /* so that the next step computes all coefficients */
     s->open = 0;
-    s->far = 0;
+    s->full_range = 0;
     return heisenberg_OK;
 }
 
-size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
+size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range)
 {
-    *far = s->far;
+    *full_range = s->full_range;
     if (!s->open) return 0;
     heisenberg_take(s, s->before, x);
     return heisenberg_DIM;
 }
 
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
-    size_t far)
+    size_t full_range)
 {
     if (s == NULL || (fields > 0 && (fields != heisenberg_DIM || x == NULL || !heisenberg_finite(x,
         fields * s->sites))))
         return heisenberg_BAD_ARGUMENT;
     if (heisenberg_set_step(s, h) != heisenberg_OK) return heisenberg_BAD_ARGUMENT;
-    s->far = far;
+    s->full_range = full_range;
     for (size_t k = 0; k < fields; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
     s->open = fields > 0;
     return heisenberg_OK;
@@ -994,7 +997,8 @@ heisenberg_status heisenberg_begin(heisenberg_solver *s, double h) { return heis
 /* Number of rows in a plane. */
 static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->rows / s->sizes[0]; }
 
-heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
+heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int full_range, size_t from,
+    size_t to)
 {
     if (s == NULL || !s->prepared || number >= heisenberg_NUMBERED || from > to || to > s->sizes[0])
         return heisenberg_BAD_ARGUMENT;
@@ -1002,7 +1006,7 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
     const double *coef = s->coef + number * heisenberg_ROW;
     const size_t units = heisenberg_rows_of_plane(s);
     s->open = 0;
-    heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);
+    heisenberg_sweep_rows(s, part, coef, full_range, from * units, to * units);
     return heisenberg_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ae7c2eafbeef8f65eefaef6c2a756e1e9069ec7446520174936b10a492fd7f83
+ * body-sha256: 1e11c8488e426f47402f73c778e75848a48e4315e39acdc594020214d3213bb7
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -40,7 +40,7 @@ typedef struct {
     double *before[heisenberg_DIM]; /* copies of the fields, which replace them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */
@@ -80,12 +80,12 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
    then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
-/* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *far, and
-   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
-   compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
-size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
+/* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range,
+   and arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that
+   with compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
+size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
-    size_t far);
+    size_t full_range);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */
@@ -110,10 +110,11 @@ size_t heisenberg_stages(void);
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
 /* heisenberg_begin computes the coefficients for a step size; call it before the first stage.
-   heisenberg_sweep makes a stage for the planes from ... to - 1. With far = 1 it uses functions for arguments
-   of any size; with far = 0 faster ones, which give NaN if an argument is too large. */
+   heisenberg_sweep makes a stage for the planes from ... to - 1. With full_range = 1 it uses functions for
+   arguments of any size; with full_range = 0 faster ones, which give NaN if an argument is too large. */
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
-heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to);
+heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int full_range, size_t from,
+    size_t to);
 
 /* Read or write the values x[plane][site] of a field, counted from 0, on the planes from ... to - 1.
    heisenberg_holds returns 1 if all fields are finite on these planes. */

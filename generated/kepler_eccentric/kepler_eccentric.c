@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 14c74fb15cbbace91b4c5d500c3e1c34f56e8a8c185bf4a70d3bad2b13b157d5
+ * body-sha256: 6a7c4b82ce2c091a3af53aaa89a3baa30e106fbde40d410b5b9df843b3eb6b07
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -85,14 +85,14 @@ static int kepler_eccentric_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *change, const double *rest)
 {
     double x[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
     for (int i = 0; i < kepler_eccentric_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -106,9 +106,9 @@ static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *ch
 static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 {
     const double sum = s->t + elapsed, added = sum - s->t;
-    const double small = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
-    s->t = sum + small;
-    s->t_carry = small - (s->t - sum);
+    const double rest = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
+    s->t = sum + rest;
+    s->t_carry = rest - (s->t - sum);
 }
 
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }

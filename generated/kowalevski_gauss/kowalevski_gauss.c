@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 16691d73d3b7edd9bb9bd51ee83b6f94a25db122c155c20a9cab067aa008edd8
+ * body-sha256: 3f5b0e2d1cb91b69e5c8b559f49504b24f2f62a1ff53bdf60a786b9146aba309
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -90,21 +90,21 @@ static int kowalevski_gauss_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change,
-    const double *small)
+    const double *rest)
 {
     /* x - x is 0 if x is finite, else NaN */
     double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM], zero = 0.0;
     /* the next step needs x only, so x is computed by two additions and does not wait for the carry */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
-        const double total = change[i] + small[i], more = total - change[i];
+        const double total = change[i] + rest[i], more = total - change[i];
         const double sum = s->x[i] + total, added = sum - s->x[i];
         x[i] = sum;
         zero += sum - sum;
         carry[i] = ((s->x[i] - (sum - added)) + (total - added)) + ((change[i] - (total - more))
-            + (small[i] - more));
+            + (rest[i] - more));
     }
     if (!(zero == 0.0)) return 0;
     /* Copy one number at a time: a load of several would wait until all of them have been stored. */

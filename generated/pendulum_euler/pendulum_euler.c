@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 03373d53922336dd94e4f2dbd981a48983f756c7d1c73f36cccdb20b7b084377
+ * body-sha256: bd41a35fa22a34c154b1e68dbbfa6647762789c9e8906b9e808a67a2cf8910bd
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -65,14 +65,14 @@ static int pendulum_euler_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change, const double *rest)
 {
     double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];
     for (int i = 0; i < pendulum_euler_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5596264c3d40dc15e42253febb89917c8274cf31dae0e6360da2ab90f06cc29f
+ * body-sha256: a5109ec85e4c306a8eea8e578e077c6888309f63af11d3122ed0ff65fe6d30f0
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -117,14 +117,14 @@ static int predator_prey_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int predator_prey_advance(predator_prey_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int predator_prey_advance(predator_prey_solver *s, const double *change, const double *rest)
 {
     double x[predator_prey_DIM], carry[predator_prey_DIM];
     for (int i = 0; i < predator_prey_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -277,13 +277,13 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
         previous = size;
         if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
         /* correction of the increment, plus the compensation term */
-        double small[predator_prey_DIM] = { 0.0 };
+        double rest[predator_prey_DIM] = { 0.0 };
         for (int i = 0; i < predator_prey_DIM; ++i)
             for (int j = 0; j < predator_prey_DIM; ++j)
-                small[i] -= slope[i * predator_prey_DIM + j] * delta[j];
-        for (int i = 0; i < predator_prey_DIM; ++i) small[i] += s->carry[i];
+                rest[i] -= slope[i * predator_prey_DIM + j] * delta[j];
+        for (int i = 0; i < predator_prey_DIM; ++i) rest[i] += s->carry[i];
         if (!predator_prey_plausible(s, increment)) return predator_prey_NO_CONVERGENCE;
-        if (!predator_prey_advance(s, increment, small)) return predator_prey_NOT_FINITE;
+        if (!predator_prey_advance(s, increment, rest)) return predator_prey_NOT_FINITE;
         predator_prey_remember(&s->history, y);
         return predator_prey_OK;
     }

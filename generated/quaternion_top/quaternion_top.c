@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: af3c119e87bb3068bae3d5fd874259a621db8b5264c4b98bacdaa835e7c1f8ba
+ * body-sha256: 3487ba698e7a35f38a811b1a9aeedf51902f1f5785e3f4be5dc99d76b683174b
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -290,14 +290,14 @@ static int quaternion_top_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int quaternion_top_advance(quaternion_top_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int quaternion_top_advance(quaternion_top_solver *s, const double *change, const double *rest)
 {
     double x[quaternion_top_DIM], carry[quaternion_top_DIM];
     for (int i = 0; i < quaternion_top_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -720,7 +720,7 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
 {
     double series[quaternion_top_SERIES][quaternion_top_TERMS + 1], fixed[quaternion_top_FIXED],
         end[quaternion_top_DIM], slope[quaternion_top_DIM], norm = 0.0;
-    int small = 0;
+    int small_terms = 0;
     for (int i = 0; i < quaternion_top_DIM; ++i) {
         series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
@@ -739,8 +739,8 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
             const double measure = fabs(start[i]) + fabs(change[i]) + quaternion_top_LEAST_SHARE * norm;
             if (!(fabs(term) <= quaternion_top_NEGLIGIBLE * measure)) negligible = 0;
         }
-        small = negligible ? small + 1 : 0;
-        if (small >= 2 && quaternion_top_holds(coef, p, end, slope)) return 1;
+        small_terms = negligible ? small_terms + 1 : 0;
+        if (small_terms >= 2 && quaternion_top_holds(coef, p, end, slope)) return 1;
     }
     return 0;
 }

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 67150e513820ba9c0291a3a8044a65a663e0212c744854fce3e6356b971130c5
+ * body-sha256: c41ae2adca99e33237e673aaa605cc4701f04c1b197a4608d15d43280aaa9caf
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -51,7 +51,7 @@ static inline double rigid_body_polynomial(const double *coefficients, int count
 /* (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 static double rigid_body_phi0(double s)
 {
-    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+    static const double central[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
         8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
         3.3896802963225827e-13, 8.586062056277845e-15 };
     static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
@@ -60,7 +60,7 @@ static double rigid_body_phi0(double s)
         8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
         1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
         2.1509755511832569e-44, 1.3621211117593843e-46 };
-    if (fabs(s) < 0.25) return rigid_body_polynomial(near, 9, s);
+    if (fabs(s) < 0.25) return rigid_body_polynomial(central, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
         return 2.0 * pole + rigid_body_polynomial(rest, 21, s);
@@ -72,7 +72,7 @@ static double rigid_body_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double rigid_body_phi1(double s)
 {
-    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+    static const double central[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
         8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
         6.868849645022276e-14, 1.9573818287022555e-15 };
     static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
@@ -81,7 +81,7 @@ static double rigid_body_phi1(double s)
         6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
         1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
         2.7242422235187686e-45, 1.8114038279637677e-47 };
-    if (fabs(s) < 0.25) return rigid_body_polynomial(near, 9, s);
+    if (fabs(s) < 0.25) return rigid_body_polynomial(central, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
         return 2.0 * pole * pole + rigid_body_polynomial(rest, 21, s);
@@ -356,14 +356,14 @@ static int rigid_body_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int rigid_body_advance(rigid_body_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int rigid_body_advance(rigid_body_solver *s, const double *change, const double *rest)
 {
     double x[rigid_body_DIM], carry[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -704,12 +704,12 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
         const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
         if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
-        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
+        double rest[rigid_body_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < rigid_body_DIM; ++i)
-            for (int j = 0; j < rigid_body_DIM; ++j) small[i] -= slope[i * rigid_body_DIM + j] * delta[j];
-        for (int i = 0; i < rigid_body_DIM; ++i) small[i] += s->carry[i];
+            for (int j = 0; j < rigid_body_DIM; ++j) rest[i] -= slope[i * rigid_body_DIM + j] * delta[j];
+        for (int i = 0; i < rigid_body_DIM; ++i) rest[i] += s->carry[i];
         if (!rigid_body_plausible(s, increment)) return rigid_body_NO_CONVERGENCE;
-        if (!rigid_body_advance(s, increment, small)) return rigid_body_NOT_FINITE;
+        if (!rigid_body_advance(s, increment, rest)) return rigid_body_NOT_FINITE;
         rigid_body_remember(&s->history, y, iteration);
         return rigid_body_OK;
     }
@@ -1361,11 +1361,11 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
-    double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
+    double residual[rigid_body_DIM], sum[rigid_body_DIM], rest[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
         residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
-        small[i] = carry[i];
+        rest[i] = carry[i];
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int after = (lane + 1) % rigid_body_LANES;
@@ -1383,13 +1383,13 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
             const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
             const double y_change = (model->y[i][after] - model->y[i][lane]) + turn;
             residual[i] = ((y_change + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            rest[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
     }
     for (int i = 0; i < rigid_body_DIM; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
+        x[i] = sum[i] + rest[i];
+        carry[i] = rest[i] - (x[i] - sum[i]);
     }
     rigid_body_correct(model, unit, most);
 }
@@ -1968,9 +1968,9 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM]
             const double change = model->increment[i][lane], sum = x[i][lane] + change,
                 added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + (carry[i][lane] - gained[i][lane]);
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
+            const double rest = lost + (carry[i][lane] - gained[i][lane]);
+            x[i][lane] = sum + rest;
+            carry[i][lane] = rest - (x[i][lane] - sum);
         }
     }
 }

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: d93615887c5560ccf87bd1ced11dadca6a0a828cb5f750bece1b4124f1cf5fd3
+ * body-sha256: 76ec5f556911ca3c3eec6feeda195935ac6cf9eb63957d5aad66d917a58b4177
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -50,7 +50,7 @@ static inline double thermal_spin_polynomial(const double *coefficients, int cou
 /* (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 static double thermal_spin_phi0(double s)
 {
-    static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
+    static const double central[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,
         8.267195767195768e-07, 2.08767569878681e-08, 5.284190138687493e-10, 1.3382536530684679e-11,
         3.3896802963225827e-13, 8.586062056277845e-15 };
     static const double rest[21] = { 0.03267274151216445, 0.000105641107053347, 5.637370282876845e-07,
@@ -59,7 +59,7 @@ static double thermal_spin_phi0(double s)
         8.318003195189264e-27, 5.267262996834231e-29, 3.3354842988221443e-31, 2.1122063323183885e-33,
         1.3375664093215244e-35, 8.470227328650247e-38, 5.363831046655698e-40, 3.3966848266497805e-42,
         2.1509755511832569e-44, 1.3621211117593843e-46 };
-    if (fabs(s) < 0.25) return thermal_spin_polynomial(near, 9, s);
+    if (fabs(s) < 0.25) return thermal_spin_polynomial(central, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
         return 2.0 * pole + thermal_spin_polynomial(rest, 21, s);
@@ -71,7 +71,7 @@ static double thermal_spin_phi0(double s)
 /* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
 static double thermal_spin_phi1(double s)
 {
-    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
+    static const double central[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
         8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
         6.868849645022276e-14, 1.9573818287022555e-15 };
     static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
@@ -80,7 +80,7 @@ static double thermal_spin_phi1(double s)
         6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
         1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
         2.7242422235187686e-45, 1.8114038279637677e-47 };
-    if (fabs(s) < 0.25) return thermal_spin_polynomial(near, 9, s);
+    if (fabs(s) < 0.25) return thermal_spin_polynomial(central, 9, s);
     if (fabs(s) < 16.0) {
         const double pole = 1.0 / (39.47841760435743 - s);
         return 2.0 * pole * pole + thermal_spin_polynomial(rest, 21, s);
@@ -211,14 +211,14 @@ static int thermal_spin_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
-   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int thermal_spin_advance(thermal_spin_solver *s, const double *change, const double *small)
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
+   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+static int thermal_spin_advance(thermal_spin_solver *s, const double *change, const double *rest)
 {
     double x[thermal_spin_DIM], carry[thermal_spin_DIM];
     for (int i = 0; i < thermal_spin_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;
@@ -332,13 +332,12 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
         const int stalled = previous < thermal_spin_NEARLY_SOLVED && size > thermal_spin_SHRINKING * previous;
         previous = size;
         if (!(remaining <= thermal_spin_TOLERANCE || stalled)) continue;
-        /* correction of the increment, plus the compensation term */
-        double small[thermal_spin_DIM] = { 0.0 };
+        double rest[thermal_spin_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < thermal_spin_DIM; ++i)
-            for (int j = 0; j < thermal_spin_DIM; ++j) small[i] -= slope[i * thermal_spin_DIM + j] * delta[j];
-        for (int i = 0; i < thermal_spin_DIM; ++i) small[i] += s->carry[i];
+            for (int j = 0; j < thermal_spin_DIM; ++j) rest[i] -= slope[i * thermal_spin_DIM + j] * delta[j];
+        for (int i = 0; i < thermal_spin_DIM; ++i) rest[i] += s->carry[i];
         if (!thermal_spin_plausible(s, increment)) return thermal_spin_NO_CONVERGENCE;
-        if (!thermal_spin_advance(s, increment, small)) return thermal_spin_NOT_FINITE;
+        if (!thermal_spin_advance(s, increment, rest)) return thermal_spin_NOT_FINITE;
         return thermal_spin_OK;
     }
     return thermal_spin_NO_CONVERGENCE;

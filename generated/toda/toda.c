@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: d4ef846bed33cffdf472a9ed8dd782df938e1ca9d3240f760adeac8cf33914ac
+ * body-sha256: 748be3fe8cc52aa6e4bb3e31bbd36bc2e1d16cd1b9484f68e0ee33f4c9284a63
  */
 #include "toda.h"
 #include <math.h>
@@ -404,20 +404,20 @@ toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1)
 
 void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }
 
-size_t toda_saved(const toda_solver *s, double *x, size_t *far)
+size_t toda_saved(const toda_solver *s, double *x, size_t *full_range)
 {
-    *far = s->far;
+    *full_range = s->full_range;
     if (!s->open) return 0;
     toda_take(s, s->before, x);
     return toda_DIM;
 }
 
-toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far)
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range)
 {
     if (s == NULL || (fields > 0 && (fields != toda_DIM || x == NULL || !toda_finite(x, fields * s->sites))))
         return toda_BAD_ARGUMENT;
     if (toda_set_step(s, h) != toda_OK) return toda_BAD_ARGUMENT;
-    s->far = far;
+    s->full_range = full_range;
     for (size_t k = 0; k < fields; ++k) toda_put(s, s->before[k], x + k * s->sites);
     s->open = fields > 0;
     return toda_OK;

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2f97f18e549dffa1557e69a2c55833ecf30b424e554a91d8cbef5274dfa95c99
+ * body-sha256: 4cd11d3699790aaa60f190dc698764f75e5dec1fccedb81ab3bfb9eabaa1a1f4
  */
 #ifndef TODA_H
 #define TODA_H
@@ -38,7 +38,7 @@ typedef struct {
     double *x[toda_ARRAYS]; /* fields, then parameters at sites, each from its first site */
     double *before[toda_DIM]; /* copies of the fields, which replace them if a step fails */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t far; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that use functions for arguments of any size */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */
@@ -68,11 +68,11 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save a run, and restore it so that it continues with the same bits. toda_saved writes *far, and arrays
-   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
+/* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range, and
+   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
    compensated steps. To restore, call toda_init, then toda_resume with these values. */
-size_t toda_saved(const toda_solver *s, double *x, size_t *far);
-toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far);
+size_t toda_saved(const toda_solver *s, double *x, size_t *full_range);
+toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

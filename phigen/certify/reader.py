@@ -237,9 +237,9 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
     beyond = re.search(rf"if \(fabs\({argument}\) > [\d.]+\) return {library_name}\({argument}\);", body) is not None
     if not branch:
         raise RefusedError(f"{name} of the C has no polynomial for small arguments")
-    if "near[" in body:
+    if "central[" in body:
         value = ""
-        for c in reversed(source.numbers("near", body)):
+        for c in reversed(source.numbers("central", body)):
             value = f"({value}) * {argument} + {c!r}" if value else repr(c)
         body = f"return {value};"
     else:

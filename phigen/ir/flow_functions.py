@@ -208,16 +208,16 @@ class Transposed:
     The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; contributions to
     other cotangents are always 0. The kernel also recomputes the values that the coordinates with the indices
     ``before`` had before the flow. ``reads`` has the coordinates that the kernel reads, as ranges (first index,
-    length). ``far`` says whether the flow has a second version, in which elementary functions are correct for all
-    arguments; ``far_back`` says the same about the transpose.
+    length). ``full_range`` says whether the flow has a second version, in which elementary functions are correct for
+    all arguments; ``full_range_back`` says the same about the transpose.
     """
 
     state: Sequence[int]
     row: Sequence[int]
     before: Sequence[int]
     reads: Sequence[tuple[int, int]]
-    far: bool
-    far_back: bool
+    full_range: bool
+    full_range_back: bool
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ class FlowTransposes:
             )
             if flow.reads:
                 yield _over_packs(tuple(copies))
-            yield _in_form(f"flow{k}", flow.far, (ROW, ir.Constant(1), GROUP))
+            yield _in_form(f"flow{k}", flow.full_range, (ROW, ir.Constant(1), GROUP))
 
         doc = "Apply the flow of a part to all members of a group, after storing the coordinates that its reverse pass"
         body = (self._switch(case),)
@@ -297,7 +297,7 @@ class FlowTransposes:
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             results = (BACK, SLOPES, *[BEFORE] * self.recomputes)
-            yield _in_form(f"flow{k}_adjoint", flow.far_back, (COEF, X, bars, *results))
+            yield _in_form(f"flow{k}_adjoint", flow.full_range_back, (COEF, X, bars, *results))
             for place, i in enumerate(flow.before):
                 yield ir.Copy(ir.entry(X, i), ir.entry(BEFORE, place))
             for place, i in enumerate(flow.state):
@@ -325,9 +325,9 @@ def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.St
     """Return the call of a function ``name`` for SIMD lanes.
 
     The function may have a second version, in which sin and other elementary functions are correct for all arguments.
-    The second version is called for groups of members whose flag ``far`` is set.
+    The second version is called for groups of members whose flag ``full_range`` is set.
     """
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:
         return near
-    return ir.If(ir.Member(GROUP, "far"), (ir.Call(f"{name}_far_lanes", arguments),), (near,))
+    return ir.If(ir.Member(GROUP, "full_range"), (ir.Call(f"{name}_full_range_lanes", arguments),), (near,))

@@ -579,7 +579,7 @@ TYPES: dict[str, ParameterType] = {
     **_NUMBERED,
     **_ARRAYS,
     **_SUMMED,
-    **dict.fromkeys(("part", "flow", "far", "across"), Type.FLAG),
+    **dict.fromkeys(("part", "flow", "full_range", "across"), Type.FLAG),
     "sign": Type.REAL,
 }
 

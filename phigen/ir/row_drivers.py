@@ -17,7 +17,7 @@ from phigen.ir.passes.function_parameters import discard_unread
 from phigen.ir.walk import names_in, statements, values
 from phigen.scheme.kernel import Role
 
-S, UNIT, COEF, FAR, PART, FLOW = (ir.fixed(name) for name in ("s", "unit", "coef", "far", "part", "flow"))
+S, UNIT, COEF, FULL_RANGE, PART, FLOW = (ir.fixed(name) for name in ("s", "unit", "coef", "full_range", "part", "flow"))
 BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "second", "third", "stop", "low", "high"))
 SEGMENT = ir.Prefix("&", ROW)
 LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
@@ -146,7 +146,7 @@ class RowDrivers:
         away: ir.Value = ir.Member(ROW, "complete")
         if sites.seams:
             low, high = inside
-            away = ir.Binary("==", ir.Member(ROW, "near"), ir.Constant(0))
+            away = ir.Binary("==", ir.Member(ROW, "near_seams"), ir.Constant(0))
         if not self.layout.single_row:
             low = ir.Select(away, low, LENGTH)
         ends = "seams" if sites.seams else "open ends"
@@ -222,13 +222,13 @@ def divides(calls: ir.Block) -> bool:
 
 
 def in_forms(blocks: dict[str, ir.Block]) -> ir.Block:
-    """Return a block that selects between functions for small and for all arguments by the flag ``far``.
+    """Return a block that selects between functions for small and for all arguments by the flag ``full_range``.
 
     ``blocks`` has a block for each suffix of `phigen.ir.passes.forms`; a single block is returned as it is.
     """
     if len(blocks) == 1:
         return next(iter(blocks.values()))
-    return (ir.If(FAR, blocks["_far"], blocks["_near"]),)
+    return (ir.If(FULL_RANGE, blocks["_full_range"], blocks["_near"]),)
 
 
 def member(name: str, value: ir.Value) -> ir.Assign:

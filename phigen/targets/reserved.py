@@ -36,7 +36,7 @@ unsigned void volatile while alignas alignof and and_eq asm bitand bitor bool ca
 co_await co_return co_yield compl concept const_cast consteval constinit contract_assert decltype delete dynamic_cast
 explicit export false friend mutable namespace new noexcept not not_eq operator or or_eq private protected public
 reinterpret_cast requires static_assert static_cast template this thread_local throw true try typeid typename using
-virtual wchar_t xor xor_eq fortran far near main size_t ptrdiff_t"""
+virtual wchar_t xor xor_eq fortran main size_t ptrdiff_t"""
 
 # Keywords and types of OpenCL C. They are reserved in C as well, so that parameters have the same names in both
 # languages.
@@ -52,9 +52,15 @@ L_ctermid L_cuserid L_tmpnam MAXFLOAT MAX_CANON MAX_INPUT MB_CUR_MAX MB_LEN_MAX 
 NGREG NGROUPS_MAX NL_ARGMAX NL_LANGMAX NL_MSGMAX NL_NMAX NL_SETMAX NL_TEXTMAX NSIG NULL NZERO ONCE_FLAG_INIT OVERFLOW
 PATH_MAX PDP_ENDIAN PIPE_BUF PLOSS P_tmpdir RAND_MAX RE_DUP_MAX RTSIG_MAX R_OK SEM_VALUE_MAX SING TLOSS TMP_MAX
 TSS_DTOR_ITERATIONS TTY_NAME_MAX UNDERFLOW WCONTINUED WEOF WEXITED WNOHANG WNOWAIT WORD_BIT WSTOPPED WUNTRACED W_OK
-XATTR_LIST_MAX XATTR_NAME_MAX XATTR_SIZE_MAX X_OK arm complex errno hpux i386 imaginary interface linux m68k
+XATTR_LIST_MAX XATTR_NAME_MAX XATTR_SIZE_MAX X_OK arm complex errno hpux i386 imaginary linux m68k
 math_errhandling max min mips noreturn sa_handler sa_sigaction sched_priority sigev_notify_attributes
-sigev_notify_function signgam small sparc stderr stdin stdout sun unix vax"""
+sigev_notify_function signgam sparc stderr stdin stdout sun unix vax"""
+_WINDOWS = (
+    """CONST ERROR FALSE FAR IN NEAR OPTIONAL OUT PURE THIS TRUE VOID cdecl far hyper interface near pascal small"""
+)
+#: Macros of windows.h and rpcndr.h that are common words. A program may include these headers before that of a solver.
+#: A member ``far`` of a struct would then vanish, since this macro is empty.
+WINDOWS_MACROS = frozenset(_WINDOWS.split())
 _ERRNO = """2BIG ACCES ADDRINUSE ADDRNOTAVAIL ADV AFNOSUPPORT AGAIN ALREADY BADE BADF BADFD BADMSG BADR BADRQC BADSLT
 BFONT BUSY CANCELED CHILD CHRNG COMM CONNABORTED CONNREFUSED CONNRESET DEADLK DEADLOCK DESTADDRREQ DOM DOTDOT DQUOT
 EXIST FAULT FBIG HOSTDOWN HOSTUNREACH HWPOISON IDRM ILSEQ INPROGRESS INTR INVAL IO ISCONN ISDIR ISNAM KEYEXPIRED
@@ -95,7 +101,7 @@ _C_FAMILIES = (
 #: Keywords of C and C++ up to C23 and C++26, keywords of OpenCL C, and macros of the standard headers on Linux and
 #: other systems.
 C_RESERVED = Reserved(
-    frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
+    frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]) | WINDOWS_MACROS,
     re.compile("|".join(_C_FAMILIES)),
 )
 

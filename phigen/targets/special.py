@@ -116,14 +116,14 @@ def _closed_forms(function: str) -> list[Expression]:
     return [form(_Calls(), symbol("s"), symbol("root")) for form in ENTIRE[function].closed]
 
 
-def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
+def full_range(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
     """Return the closed form of a function of `ENTIRE` as text, and whether it contains the ``root`` of |s|.
 
     ``choice`` is the format of a conditional in the language: {0} is the value for s > 0, {1} for s < 0.
     """
     forms = _closed_forms(function)
     texts = [printer(Scope(Reserved()))(expand_powers([form])[0]) for form in forms]
-    return {"far": choice.format(*texts) if len(texts) > 1 else texts[0], "root": "root" in symbols_of(*forms)}
+    return {"full_range": choice.format(*texts) if len(texts) > 1 else texts[0], "root": "root" in symbols_of(*forms)}
 
 
 def entire_used(program: Program) -> list[str]:

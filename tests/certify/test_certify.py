@@ -701,7 +701,7 @@ def test_the_runtime_has_the_lines_that_the_proofs_assume() -> None:
     expect_phrases(
         "pendulum",
         {
-            "attempt": ("((y[i] - s->x[i]) + displacement[i]) - s->carry[i]", "size * size *", "small[i] -= slope"),
+            "attempt": ("((y[i] - s->x[i]) + displacement[i]) - s->carry[i]", "size * size *", "rest[i] -= slope"),
             "advance": ("(s->x[i] - (sum - added)) + (change[i] - added)", "lost - (x[i] - sum)"),
             "solve": ("factor = matrix[i * DIM + k] / pivot", "side[i] -= factor * side[k]"),
             "size": ("fabs(delta[i]) / (fabs(y[i]) + FLOOR * norm + DBL_MIN)",),
@@ -733,7 +733,7 @@ def test_the_runtime_has_the_lines_that_the_proofs_assume() -> None:
             ),
             "piece": (
                 "fabs(start[i]) + fabs(change[i]) + LEAST_SHARE * norm",
-                "if (small >= 2 && holds(coef, p, end, slope)) return 1",
+                "if (small_terms >= 2 && holds(coef, p, end, slope)) return 1",
             ),
         },
     )

@@ -139,7 +139,7 @@ static void groups_make_all_steps(double h)
     EXPECT(F(group_steps)(&group, 10) == F(GROUP));
     for (int m = 0; m < F(GROUP); ++m) EXPECT(group.steps_left[m] == 0);
 #if FAR > 1
-    EXPECT(group.far == (h != STEP));
+    EXPECT(group.full_range == (h != STEP));
 #endif
 }
 

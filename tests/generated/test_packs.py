@@ -202,7 +202,10 @@ def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
     run([tool(compiler), *flags, f"{name}.c", "-o", "packs.s"], tmp_path)
     vector, scalar, spread, function = 0, 0, 0, ""
     steps = re.compile(r".*_(?:lanes|group_(?:run|steps|advance))")
-    beside = ("_group_run", "_far_lanes")  # the first may contain single steps; the second calls libm for each lane
+    beside = (
+        "_group_run",
+        "_full_range_lanes",
+    )  # the first may contain single steps; the second calls libm for each lane
     for line in (tmp_path / "packs.s").read_text().splitlines():
         label = re.match(r"(\w[\w.]*):", line)
         function = label[1] if label else function

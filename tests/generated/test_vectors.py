@@ -19,12 +19,18 @@ CASES = {
     "equations": ("rigid_body", {}, "evaluate_lanes linearise_lanes invert_lanes apply foresee group_foresee"),
     "paths": ("nambu_pendulum", {}, "curvature_lanes momentum_lanes values_lanes along_mean_lanes follow add_terms"),
     "explicit": ("pendulum_euler", {"adjoint": True}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
-    "flows": ("toda3", {"scheme": "splitting"}, "add_lanes change1_lanes change2_lanes change1_far_lanes settle_lanes"),
+    "flows": (
+        "toda3", {"scheme": "splitting"},
+        "add_lanes change1_lanes change2_lanes change1_full_range_lanes settle_lanes",
+    ),
     "flows back": (
         "rigid_body", {"scheme": "splitting", "adjoint": True},
-        "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes",
+        "flow1_adjoint_lanes flow2_adjoint_full_range_lanes gain_lanes",
     ),
-    "sites": ("heisenberg", {}, "sweep1_near sweep1_far sweep2_near sweep3_far vector_field_row energy_row"),
+    "sites": (
+        "heisenberg", {},
+        "sweep1_near sweep1_full_range sweep2_near sweep3_full_range vector_field_row energy_row",
+    ),
     "sites back": ("klein_gordon", {"adjoint": True}, "sweep1 sweep2 sweep1_back sweep2_back"),
     "pairs": ("outer_planets", {}, "pair_forces sweep1 sweep2"),
     "equations of sites": ("kdv", {}, "slope relax increment"),

@@ -41,8 +41,8 @@ def test_flows_of_a_step_follow_each_other_and_a_tape_receives_the_states_before
 
 
 def test_batches_count_rows_of_coefficients():
-    assert "    flow1_far_lanes((row + 1), distinct_coef, group)\n    row += 2" in text(
-        group_schedule(SCHEDULE, "_far")
+    assert "    flow1_full_range_lanes((row + 1), distinct_coef, group)\n    row += 2" in text(
+        group_schedule(SCHEDULE, "_full_range")
     )
 
 
@@ -57,17 +57,17 @@ def test_values_that_a_flow_does_not_update_are_left_out():
 
 
 def test_cotangents_are_added_where_a_flow_has_read():
-    flow = Transposed(state=[1], row=[0], before=[], reads=[(0, 1)], far=True, far_back=False)
+    flow = Transposed(state=[1], row=[0], before=[], reads=[(0, 1)], full_range=True, full_range_back=False)
     transposes = FlowTransposes([flow, flow], 2, 3, recomputes=False)
     assert "      bar[1] += back[0]\n      coef_bar[0] += slopes[0]" in text(transposes.back())
     stored = commented(transposes.group_flows(), PROGRAM)
     assert f"{NAME}_lanes tape[{NAME}_BACK_PACKS][2])" in stored
     assert "memcpy(tape[k][0], group->pack[k].x[0], 1 * sizeof tape[k][0]);" in stored
-    assert f"if (group->far) {NAME}_flow2_far_lanes(row, 1, group);" in stored
+    assert f"if (group->full_range) {NAME}_flow2_full_range_lanes(row, 1, group);" in stored
 
 
 def test_an_inverse_flow_needs_no_tape():
-    flow = Transposed(state=[], row=[], before=[1], reads=[], far=False, far_back=False)
+    flow = Transposed(state=[], row=[], before=[1], reads=[], full_range=False, full_range_back=False)
     back = text(FlowTransposes([flow], 2, 1, recomputes=True).group_back())
     assert back.startswith("follow_back_lanes(part, row, group, bar)")
     assert "copy before[0] to x[1]" in back

@@ -198,7 +198,7 @@ def test_functions_have_a_small_argument_and_a_full_range_form() -> None:
         "atan(q) + (sin_near(q) + exp_lane(q))",
         "atan(q) + (sin_lane(q) + exp(q))",
     ]
-    assert [*forms] == ["_near", "_far"]
+    assert [*forms] == ["_near", "_full_range"]
     assert forms_of([before], ["sin"], {"expm1"}, FULL_RANGE) == {"": FULL_RANGE}
 
 

@@ -24,7 +24,7 @@ from phigen.ir.row_drivers import (
 from phigen.targets.c.loops import statements
 
 KICK, DRIFT = ir.Call("kick", (COEF, SEGMENT)), ir.Call("drift", (COEF, SEGMENT))
-PARAMETERS = ("part", "coef", "far")
+PARAMETERS = ("part", "coef", "full_range")
 
 
 def expect(function: ir.Function, expected: str) -> None:
@@ -35,7 +35,7 @@ def test_each_part_has_a_loop_over_segments_and_copies_the_ends_of_the_rows_that
     drivers = RowDrivers(rows(lattice("fput")), halo=1)
     cases = [RowSegment((KICK,), updated=[1]), RowSegment((DRIFT,), updated=[0])]
     expect(drivers.driver("sweep", "", PARAMETERS, cases), """
-        discard far
+        discard full_range
         switch part:
           case 1:
             segments unit in first..end:
@@ -54,7 +54,7 @@ def test_short_code_distinguishes_the_parts_inside_one_loop_that_threads_share()
     drivers = RowDrivers(rows(lattice("fput")), halo=0, may_be_empty=True, one_loop=True)
     driver = drivers.driver("sweep", "", PARAMETERS, [RowSegment((KICK,)), RowSegment((DRIFT,))], [1, 4], threads=4096)
     expect(driver, """
-        discard far
+        discard full_range
         size units = units(s)
         segments unit in 0..units by threads above 4096 sites:
           recordtype row = piece_of(s, unit)
@@ -87,13 +87,13 @@ def test_sites_near_open_ends_have_loops_of_their_own() -> None:
 
 def test_the_flag_far_selects_the_full_range_form() -> None:
     drivers = RowDrivers(rows(lattice("fput")), halo=0)
-    calls = in_forms({"_far": (DRIFT,), "_near": (KICK,)})
+    calls = in_forms({"_full_range": (DRIFT,), "_near": (KICK,)})
     case = RowSegment(calls, (member("x", ir.fixed("coef")),))
     expect(drivers.driver("sweep", "", PARAMETERS, [case], alone=True), """
         discard part
         recordtype row = piece_of(s, unit)
         row.x <- coef
-        if far:
+        if full_range:
           drift(coef, &row)
         else:
           kick(coef, &row)
@@ -104,7 +104,7 @@ def test_c_calls_the_function_that_a_flag_selects() -> None:
     """The C branches and calls one of two functions. A conditional expression that selects a function pointer is not
     inlined by gcc, and is 4 % slower on chains of 1,024 spins.
     """
-    (choice,) = in_forms({"_far": (DRIFT,), "_near": (replace(DRIFT, name="drift_near"),)})
+    (choice,) = in_forms({"_full_range": (DRIFT,), "_near": (replace(DRIFT, name="drift_near"),)})
     printed = ir.Function("sweep", "", ir.Role.OTHER, PARAMETERS, (choice,))
-    lines = ["    if (far) toda_drift(coef, &row);", "    else toda_drift_near(coef, &row);"]
+    lines = ["    if (full_range) toda_drift(coef, &row);", "    else toda_drift_near(coef, &row);"]
     assert statements(printed, as_given("toda").program) == lines

@@ -243,7 +243,7 @@ int main(void)
     }
     sines_solver s, fresh;
     if (work == NULL || other == NULL || sines_init(&s, &params, sizes, large, work)) return 1;
-    if (sines_integrate(&s, 0.05, 2) || s.far == 0) return 2;
+    if (sines_integrate(&s, 0.05, 2) || s.full_range == 0) return 2;
     if (sines_set_state(&s, small)) return 3;
     params.b = 0.9;
     if (sines_set_parameters(&s, &params) || sines_init(&fresh, &params, sizes, small, other)) return 4;

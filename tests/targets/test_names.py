@@ -18,7 +18,7 @@ from phigen.symbolic.symbols import TEMPORARY, Symbol
 from phigen.targets.c import phrases
 from phigen.targets.header import is_edited, plain
 from phigen.targets.names import Scope, identifiers
-from phigen.targets.reserved import C_RESERVED, JAVASCRIPT_RESERVED, PYTHON_RESERVED
+from phigen.targets.reserved import C_RESERVED, JAVASCRIPT_RESERVED, PYTHON_RESERVED, WINDOWS_MACROS
 
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror"]
 
@@ -80,6 +80,23 @@ def test_no_macro_of_the_standard_headers_is_an_identifier(compiler, language, s
     macros = re.findall(r"^#define (\w+)(?!\S)", defined, re.MULTILINE)
     assert {"INT_MAX", "errno", "__STDC_HOSTED__"} < set(macros)
     assert [m for m in macros if m not in C_RESERVED] == []
+
+
+def test_no_identifier_of_generated_c_is_a_macro_of_windows():
+    """The whole solvers of the corpus, and the paragraphs of all others, have no identifier that windows.h defines."""
+    root = resources.bundled_specs().parent
+    texts = [path.read_text() for path in root.glob("generated/*/*.[ch]")]
+    for path in root.glob("tests/golden/*.txt"):
+        _, *sections = re.split(r"^==== (.*) ====$", path.read_text(), flags=re.MULTILINE)
+        texts += [
+            section for file, section in zip(sections[::2], sections[1::2], strict=True) if file.endswith((".c", ".h"))
+        ]
+    text = "\n".join(texts)
+    identifiers_of_c = set(
+        re.findall(r"[A-Za-z_]\w*", re.sub(r"/\*.*?\*/|//[^\n]*|\"[^\"\n]*\"", "", text, flags=re.DOTALL))
+    )
+    assert {"full_range", "size_t", "rigid_body_step"} < identifiers_of_c
+    assert identifiers_of_c & WINDOWS_MACROS == set()
 
 
 @pytest.mark.parametrize("standard", ["c99", "gnu17"])

@@ -53,7 +53,7 @@ def forms_of(
     """Return the forms in which functions are needed: a map from the suffix of a form to the versions that it
     calls.
 
-    The form "_near" is for small arguments, and "_far" for all arguments. ``small_argument`` are the elementary
+    The form "_near" is for small arguments, and "_full_range" for all arguments. ``small_argument`` are the elementary
     functions with a polynomial for small arguments. ``limited`` are the elementary functions whose fast versions fail
     at large arguments. If no limited function is called, there is a single form, with the suffix "".
     """
@@ -61,4 +61,4 @@ def forms_of(
     if {e.op for e in topological(graphs)}.isdisjoint(limited):
         return {"": versions}
     near = {f: f + (LANE if f in SPECIAL else NEAR) for f in small_argument}
-    return {"_near": {**versions, **near}, "_far": FULL_RANGE}
+    return {"_near": {**versions, **near}, "_full_range": FULL_RANGE}

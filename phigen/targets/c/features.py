@@ -50,7 +50,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
     yield Feature("ALONG", lambda p: p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")
-    yield Feature("FAR", lambda p: packs and packs.small_argument, ("PACKS",))
+    yield Feature("FULL_RANGE", lambda p: packs and packs.small_argument, ("PACKS",))
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
     together = "PACKS" if packs else "GROUPS"
     yield Feature("BATCHED", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))

@@ -55,14 +55,14 @@ C = TypeVar("C", float, Fraction)
 class Small:
     """Elementary function with a series for small arguments t: Σ_k s_k z^k/(first + k·step)!.
 
-    The factors s_k alternate between the two ``signs``. If ``step`` is 2, z is t²; if ``step`` is 1, z is t. ``far`` is
-    a formula for all arguments. ``flows`` describes the version that flows call: the largest |t|, the number of terms,
-    and a formula in which P is the sum. ``rows`` describes the version for loops over sites in the same way. This
-    version has the fewest operations.
+    The factors s_k alternate between the two ``signs``. If ``step`` is 2, z is t²; if ``step`` is 1, z is t.
+    ``full_range`` is a formula for all arguments. ``flows`` describes the version that flows call: the largest |t|, the
+    number of terms, and a formula in which P is the sum. In the same way, ``rows`` describes the version for loops over
+    sites. This version has the fewest operations.
     """
 
     meaning: str
-    far: str
+    full_range: str
     first: int
     step: int
     signs: tuple[int, int]
@@ -216,7 +216,7 @@ def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
 def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
     near = needed(program, near_coefficients(order_of(f)), NEAR)
     rest = needed(program, rest_coefficients(order_of(f)), MIDDLE)
-    tables = [line for name, numbers in (("near", near), ("rest", rest)) for line in _table(name, numbers)]
+    tables = [line for name, numbers in (("central", near), ("rest", rest)) for line in _table(name, numbers)]
     values = dict(special.values(f, f)) | {"NAME": program.name, "function": f, "tables": tables}
     *closed, last = special.closed(order_of(f))
     closed_form = {"closed": closed[1:] if device else closed, "value": last.split(" = ")[1]}
@@ -251,12 +251,12 @@ def _values(program: Program, f: str) -> dict[str, object]:
         entire, t, form = ENTIRE[f], "s", "{P}"
         meaning, radius = entire.meaning, entire.radius
         names = {**FUNCTIONS, **{name: f"{program.name}_{name}" for name in ENTIRE}}
-        outside = special.far(f, lambda scope: printer(scope, names), "s > 0.0 ? {0} : {1}")
+        outside = special.full_range(f, lambda scope: printer(scope, names), "s > 0.0 ? {0} : {1}")
         lines, value = estrin(needed(program, entire.terms(), radius), t)
     else:
         small, t = _SMALL[f], "t"
         (radius, count, form), meaning, squared = small.flows, small.meaning, small.step == 2
-        outside = {"far": small.far, "root": False}
+        outside = {"full_range": small.full_range, "root": False}
         terms = needed(program, small.terms(count), radius**2 if squared else radius)
         lines, value = estrin(terms, "z" if squared else "t")
         lines = ["const double z = t * t;"] * squared + lines

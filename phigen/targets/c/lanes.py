@@ -110,4 +110,4 @@ def packed_step(program: Program, step: Splitting, packs: Packs) -> list[str]:
     called = operations([*packs.kernels, *packs.transposes])
     texts = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
     texts += splitting.in_lanes(program, step, "", _NEAR)
-    return texts + (splitting.in_lanes(program, step, "_far", SIMD) if packs.small_argument else [])
+    return texts + (splitting.in_lanes(program, step, "_full_range", SIMD) if packs.small_argument else [])

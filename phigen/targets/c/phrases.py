@@ -537,7 +537,7 @@ MATRIX = Choice(
 JOINED = Choice(
     "In a splitting, the last flow of a step is merged with the first flow of the next step; here no flow is pending.",
     ("SERIES",),
-    {"NOT_OPEN(s)": ("", "s->open = 0;"), "NOT_FAR(s)": ("", "s->far = 0;")},
+    {"NOT_OPEN(s)": ("", "s->open = 0;"), "NOT_FULL_RANGE(s)": ("", "s->full_range = 0;")},
 )
 
 MOMENTA = Choice(
@@ -546,12 +546,12 @@ MOMENTA = Choice(
     {"OR_NO_MASS(mass)": ("|| !(mass > 0.0)", "")},
 )
 
-FAR = Choice(
-    "If functions have versions for small arguments: the flag far, which is 1 if arguments may be large.",
+FULL_RANGE = Choice(
+    "If functions have versions for small arguments: the flag full_range, which is 1 if arguments may be large.",
     ("NEAR",),
     {
-        "AND_FAR(far)": (", far", ""),
-        "AND_INT_FAR": (", int far", ""),
+        "AND_FULL_RANGE(full_range)": (", full_range", ""),
+        "AND_INT_FULL_RANGE": (", int full_range", ""),
         "TRY_FLOWS": ("phi_close(s)", "phi_try(s, 0)"),
     },
 )
@@ -750,7 +750,7 @@ ALL = (
     MATRIX,
     JOINED,
     MOMENTA,
-    FAR,
+    FULL_RANGE,
     STAGE_PREDICTORS,
     SWEEPS,
     LIFTS,

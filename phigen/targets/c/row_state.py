@@ -113,7 +113,7 @@ LATTICE = (
         "!SERIES",
         (
             "int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */",
-            "size_t far; /* number of next steps that use functions for arguments of any size */",
+            "size_t full_range; /* number of next steps that use functions for arguments of any size */",
         ),
     ),
     StateBlock(
@@ -367,9 +367,9 @@ ROW = (
         reset=("row.window = 0.0;",),
     ),
     StateBlock(
-        "near",
+        "near_seams",
         "SEAMS && !ONE_ROW",
-        ("int near;                     /* bits: the axes across the row along which it is near a seam */",),
+        ("int near_seams;               /* bits: the axes across the row along which it is near a seam */",),
     ),
     StateBlock(
         "colour",

@@ -97,27 +97,28 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
 
 
 def adjoint_in_lanes(
-    program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], far: Mapping[str, str]
+    program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], full_range: Mapping[str, str]
 ) -> list[str]:
     """Return the text of the transposes of the flows for batches of members in SIMD lanes.
 
     The transposes call the versions ``near`` of elementary functions, some of which are correct for small arguments
-    only. A transpose that calls one of these is printed a second time, with the versions ``far`` for all arguments.
+    only. A transpose that calls one of these is printed a second time, with the versions ``full_range`` for all
+    arguments.
     """
     kernels, build = _transposed(program, step, back)
     texts = []
     for kernel in kernels:
         linkage = f"{program.name}_IN_PLACE static inline"
         texts.append(function(program, kernel, lanes=True, versions=near, linkage=linkage))
-        if reaches_far(kernel):
-            far_kernel = replace(kernel, name=f"{kernel.name}_far")
+        if reaches_full_range(kernel):
+            full_range_kernel = replace(kernel, name=f"{kernel.name}_full_range")
             linkage = f"{program.name}_APART static"
-            texts.append(function(program, far_kernel, lanes=True, versions=far, linkage=linkage))
+            texts.append(function(program, full_range_kernel, lanes=True, versions=full_range, linkage=linkage))
     texts += [] if build.recomputes else [commented(build.group_flows(), program)]
     return [*texts, commented(build.group_back(), program)]
 
 
-def reaches_far(kernel: Kernel) -> bool:
+def reaches_full_range(kernel: Kernel) -> bool:
     """Whether a kernel in lanes needs a second version, for all arguments of elementary functions."""
     return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
@@ -134,8 +135,8 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
         ]
         kernels.append(replace(kernel, outputs=tuple(outputs)))
         state, row, before = (*reached, [])[:3]
-        far, far_back = reaches_far(flow), reaches_far(kernels[-1])
-        flows.append(Transposed(state, row, before, _read(kernels[-1]), far, far_back))
+        full_range, full_range_back = reaches_full_range(flow), reaches_full_range(kernels[-1])
+        flows.append(Transposed(state, row, before, _read(kernels[-1]), full_range, full_range_back))
     recomputes = any(len(kernel.outputs) > 2 for kernel in kernels)
     return kernels, FlowTransposes(flows, program.dimension, max(1, step.row), recomputes=recomputes)
 

@@ -176,9 +176,9 @@ TRANSPOSE = (
     ),
     StateBlock("end", members=("double *end[PHI_DIM];       /* state after all steps of the run */",)),
     StateBlock(
-        "last_far",
+        "last_full_range",
         "!SERIES",
-        ("size_t last_far;            /* value of s->far after all steps */",),
+        ("size_t last_full_range;     /* value of s->full_range after all steps */",),
     ),
     StateBlock("block", members=("size_t block;               /* size of a field, in doubles */",)),
     StateBlock("of_step", "!RECOMPUTED", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
@@ -187,7 +187,7 @@ TRANSPOSE = (
     StateBlock(
         "marks",
         "!SERIES",
-        ("size_t *marks;              /* for each checkpoint, number of its step and value of s->far */",),
+        ("size_t *marks;              /* for each checkpoint, number of its step and value of s->full_range */",),
     ),
     StateBlock(
         "counts",
@@ -196,7 +196,7 @@ TRANSPOSE = (
             "size_t longest;             /* largest number of steps of a segment */",
             "size_t first_step;          /* number of steps made before the run */",
             "size_t unasked;             /* updates of sites since s->stop was called last */",
-            "int far;                    /* 1 if the reverse pass uses full-range functions */",
+            "int full_range;             /* 1 if the reverse pass uses full-range functions */",
             "int failed;                 /* 1 if small-argument functions were out of range */",
         ),
     ),

@@ -71,5 +71,5 @@ def _entire(function: str, printer: Callable[[Scope], Printer]) -> dict[str, Any
         "meaning": entire.meaning,
         "radius": repr(entire.radius),
         "coefficients": _number_lines([float(c) for c in entire.terms()]),
-        **special.far(function, printer, "s > 0 ? {0} : {1}"),
+        **special.full_range(function, printer, "s > 0 ? {0} : {1}"),
     }

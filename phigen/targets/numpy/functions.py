@@ -51,5 +51,5 @@ def _entire(function: str) -> Mapping[str, object]:
         "radius": repr(entire.radius),
         "last": last,
         "others": others,
-        **special.far(function, LANGUAGE.printer, "np.where(s > 0.0, {0}, {1})"),
+        **special.full_range(function, LANGUAGE.printer, "np.where(s > 0.0, {0}, {1})"),
     }

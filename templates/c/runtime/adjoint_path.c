@@ -41,7 +41,7 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
 {
     double series[PHI_BACK_SERIES][PHI_TERMS + 1], fixed[PHI_BACK_FIXED], end[PHI_BACK], slope[PHI_BACK];
     double of_start[4], of_change[4];
-    int small = 0;
+    int small_terms = 0;
     for (int i = 0; i < PHI_BACK; ++i) {
         series[i][0] = start[i];
         change[i] = slope[i] = 0.0;
@@ -63,8 +63,8 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
             const double size = of_start[g] + of_change[g];
             if (!(fabs(series[i][k + 1]) <= PHI_BACK_NEGLIGIBLE * size + DBL_MIN)) negligible = 0;
         }
-        small = negligible ? small + 1 : 0;
-        if (small >= 2 && phi_back_holds(coef, p, end, slope)) return 1;
+        small_terms = negligible ? small_terms + 1 : 0;
+        if (small_terms >= 2 && phi_back_holds(coef, p, end, slope)) return 1;
     }
     return 0;
 }

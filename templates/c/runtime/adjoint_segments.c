@@ -10,7 +10,7 @@
    of the segments. */
 #include "adjoint_flows_lanes.h"
 
-#include "adjoint_segments_far.c"
+#include "adjoint_segments_full_range.c"
 #include "adjoint_segments_near.c"
 
 /* Make all steps, and write the states at the starts of all segments but the first to the tape. */

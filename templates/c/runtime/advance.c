@@ -5,14 +5,14 @@
 
 #include "model.h"
 
-/* Add change + small to x by compensated summation. small holds the compensation term and other terms that are small
+/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are small
    compared with change. Returns 0, with x unchanged, if the sum is not finite. */
-static int phi_advance(phi_solver *s, const double *change, const double *small)
+static int phi_advance(phi_solver *s, const double *change, const double *rest)
 {
     double x[PHI_DIM], carry[PHI_DIM];
     for (int i = 0; i < PHI_DIM; ++i) {
         const double sum = s->x[i] + change[i], added = sum - s->x[i];
-        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + small[i];
+        const double lost = ((s->x[i] - (sum - added)) + (change[i] - added)) + rest[i];
         x[i] = sum + lost;
         carry[i] = lost - (x[i] - sum);
         if (!isfinite(x[i])) return 0;

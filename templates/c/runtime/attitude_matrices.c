@@ -37,14 +37,14 @@ static int phi_doublings(double square)
    rounding errors, so orthogonal matrices are made orthogonal again after it. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
-    double small[PHI_COVECTOR], square[PHI_ELEMENT];
+    double scaled[PHI_COVECTOR], square[PHI_ELEMENT];
     int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* the last number of p bounds the squared norm of P */
     if (doublings == 0) {
         phi_exponential(p, element);
         return;
     }
-    for (int i = 0; i < PHI_COVECTOR; ++i) small[i] = ldexp(p[i], -doublings);
-    phi_exponential(small, element);
+    for (int i = 0; i < PHI_COVECTOR; ++i) scaled[i] = ldexp(p[i], -doublings);
+    phi_exponential(scaled, element);
     for (; doublings > 0; --doublings) {
         phi_group_product(element, element, square);
         for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + square[i];

@@ -30,8 +30,8 @@ typedef struct {
     int packs;    /* number of batches in use */
     int distinct_coef;      /* whether members have different coefficients */
     int prepared; /* whether coefficients that all members share have been computed */
-#if PHI_FAR
-    int far; /* whether an argument is too large for the fast functions, which need small arguments */
+#if PHI_FULL_RANGE
+    int full_range; /* whether an argument is too large for the fast functions, which need small arguments */
 #endif
     int active[PHI_GROUP];       /* whether the lane holds a member that has not failed */
     size_t steps_left[PHI_GROUP]; /* number of steps that the member has still to make */
@@ -65,13 +65,13 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 #include "batches_explicit.c"
 #include "batches_splitting.c"
 
-#if PHI_FAR
+#if PHI_FULL_RANGE
 /* Make steps of a group with functions that accept arguments of any size. */
-PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
+PHI_APART static void phi_steps_full_range_lanes(phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
         phi_begin_lanes(group);
-        phi_flows_far_lanes(0, 1, group); /* correct for equal coefficients too */
+        phi_flows_full_range_lanes(0, 1, group); /* correct for equal coefficients too */
         phi_end_lanes(group);
     }
 }
@@ -113,12 +113,12 @@ static int phi_group_steps(phi_group *group, int steps)
     phi_pack before[PHI_PACK_COUNT];
     int lost[PHI_GROUP], active = 0;
     memcpy(before, group->pack, sizeof before);
-#if PHI_FAR
-    if (!group->far) phi_group_advance(group, steps);
-    if (group->far || phi_group_lost(group, lost) > 0) {
+#if PHI_FULL_RANGE
+    if (!group->full_range) phi_group_advance(group, steps);
+    if (group->full_range || phi_group_lost(group, lost) > 0) {
         memcpy(group->pack, before, sizeof before);
-        phi_steps_far_lanes(group, steps);
-        group->far = phi_group_lost(group, lost) == 0;
+        phi_steps_full_range_lanes(group, steps);
+        group->full_range = phi_group_lost(group, lost) == 0;
     }
 #else
     phi_group_advance(group, steps);

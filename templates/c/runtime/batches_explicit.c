@@ -14,9 +14,9 @@ PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int distinct_co
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double change = increment[i][lane], sum = x[lane] + change, added = sum - x[lane];
-            const double small = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
-            x[lane] = sum + small;
-            carry[lane] = small - (x[lane] - sum);
+            const double rest = ((x[lane] - (sum - added)) + (change - added)) + carry[lane];
+            x[lane] = sum + rest;
+            carry[lane] = rest - (x[lane] - sum);
         }
     }
 }

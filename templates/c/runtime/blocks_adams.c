@@ -44,7 +44,7 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
         1070017.0 / 3628800.0 };
     double predicted[PHI_DIM], corrected[PHI_DIM];
     const int first = done + 1 - PHI_PAST;
-    int far = 0;
+    int astray = 0;
     for (int i = 0; i < PHI_DIM; ++i) {
         double sum = 0.0;
         for (int k = 0; k < PHI_PAST; ++k) sum += predict[k] * slope[i][first + k];
@@ -55,9 +55,9 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
         double sum = 0.0;
         for (int k = 0; k <= PHI_PAST; ++k) sum += correct[k] * slope[i][first + k];
         corrected[i] = x[i] + s->h * sum;
-        far += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * slope[i][done + 1])));
+        astray += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * slope[i][done + 1])));
     }
-    if (far > 0) return 0;
+    if (astray > 0) return 0;
     memcpy(x, corrected, sizeof corrected);
     return 1;
 }

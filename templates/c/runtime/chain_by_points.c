@@ -10,14 +10,14 @@
 static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
     phi_lanes most)
 {
-    double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+    double residual[PHI_DIM], sum[PHI_DIM], rest[PHI_DIM];
 #if PHI_SPARSE
     double delta[PHI_DIM], gained[PHI_DIM];
 #endif
     for (int i = 0; i < PHI_DIM; ++i) {
         residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
-        small[i] = carry[i];
+        rest[i] = carry[i];
     }
 #if PHI_COMPOSED
     for (int k = 0; k < (int)PHI_STAGES * PHI_LANES; ++k) {
@@ -34,7 +34,7 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
             const double turn = (PHI_IN(model, next, displacement)[i][after] - PHI_IN(model, stage, displacement)[i][lane]) - change;
             PHI_IN(model, stage, residual)[i][lane] = residual[i];
             residual[i] = (((PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn) + residual[i]) + gained[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
+            rest[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
             sum[i] = total;
         }
 #else
@@ -49,14 +49,14 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
             const double turn = (PHI_IN(model, next, displacement)[i][after] - PHI_IN(model, stage, displacement)[i][lane]) - change;
             const double y_change = (PHI_IN(model, next, y)[i][after] - PHI_IN(model, stage, y)[i][lane]) + turn;
             residual[i] = ((y_change + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            rest[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
         }
 #endif
     }
     for (int i = 0; i < PHI_DIM; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
+        x[i] = sum[i] + rest[i];
+        carry[i] = rest[i] - (x[i] - sum[i]);
     }
 #if PHI_COMPOSED
     phi_lanes size;

@@ -98,11 +98,11 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {
-    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size;
+    phi_lanes residual[PHI_DIM], sum[PHI_DIM], low[PHI_DIM], size;
     memset(most, 0, PHI_LANES * sizeof most[0]);
     phi_first_residuals(model, turn, x, carry, residual);
     memset(sum, 0, sizeof sum);
-    memset(small, 0, sizeof small);
+    memset(low, 0, sizeof low);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = model + stage;
         phi_lanes delta[PHI_DIM], gained[PHI_DIM];
@@ -112,7 +112,7 @@ static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DI
             for (int lane = 0; lane < PHI_LANES; ++lane) {
                 const double change = this_stage->increment[i][lane], total = sum[i][lane] + change;
                 const double added = total - sum[i][lane];
-                small[i][lane] += ((sum[i][lane] - (total - added)) + (change - added)) - gained[i][lane];
+                low[i][lane] += ((sum[i][lane] - (total - added)) + (change - added)) - gained[i][lane];
                 sum[i][lane] = total;
                 residual[i][lane] = (residual[i][lane] + gained[i][lane]) + this_stage->residual[i][lane];
             }
@@ -124,7 +124,7 @@ static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DI
         double rounded = x[i], rest = carry[i];
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double total = rounded + sum[i][lane], added = total - rounded;
-            rest += ((rounded - (total - added)) + (sum[i][lane] - added)) + small[i][lane];
+            rest += ((rounded - (total - added)) + (sum[i][lane] - added)) + low[i][lane];
             rounded = total;
         }
         x[i] = rounded + rest;

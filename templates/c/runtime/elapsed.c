@@ -6,9 +6,9 @@
 static void phi_pass(phi_solver *s, double elapsed)
 {
     const double sum = s->t + elapsed, added = sum - s->t;
-    const double small = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
-    s->t = sum + small;
-    s->t_carry = small - (s->t - sum);
+    const double rest = s->t_carry + ((s->t - (sum - added)) + (elapsed - added));
+    s->t = sum + rest;
+    s->t_carry = rest - (s->t - sum);
 }
 
 double phi_solver_time(const phi_solver *s) { return s->t + s->t_carry; }

@@ -200,14 +200,14 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
 {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], zero = { 0.0 };
     for (int i = 0; i < PHI_DIM; ++i) {
-        const double *was = group->x[i], *small = group->carry[i], *by = change[i];
+        const double *was = group->x[i], *rest = group->carry[i], *by = change[i];
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double total = by[lane] + small[lane], more = total - by[lane];
+            const double total = by[lane] + rest[lane], more = total - by[lane];
             const double sum = was[lane] + total, added = sum - was[lane];
             x[i][lane] = sum;
             zero[lane] += sum - sum; /* sum - sum is 0 if the sum is finite, else NaN */
-            carry[i][lane] = ((was[lane] - (sum - added)) + (total - added)) + ((by[lane] - (total - more)) + (small[lane] - more));
+            carry[i][lane] = ((was[lane] - (sum - added)) + (total - added)) + ((by[lane] - (total - more)) + (rest[lane] - more));
         }
     }
     for (int lane = 0; lane < PHI_LANES; ++lane) group->active[lane] = group->active[lane] && zero[lane] == 0.0;

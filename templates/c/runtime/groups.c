@@ -218,9 +218,9 @@ static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[res
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change, added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + (carry[i][lane] - PHI_GAINED(model)[i][lane]);
-            x[i][lane] = sum + small;
-            carry[i][lane] = small - (x[i][lane] - sum);
+            const double rest = lost + (carry[i][lane] - PHI_GAINED(model)[i][lane]);
+            x[i][lane] = sum + rest;
+            carry[i][lane] = rest - (x[i][lane] - sum);
         }
     }
 }

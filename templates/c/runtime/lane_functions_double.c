@@ -72,9 +72,9 @@ static inline double phi_log_lane(double u)
     sum = sum * qq + 0.14285714285714285;
     other = other * qq + 0.2;
     sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact; the terms in small are small compared with it */
-    const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
-    const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
+    /* m - 1 is exact; the terms in low are small compared with it */
+    const double low = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
+    const double rest = (m - 1.0) - f * (m - 1.0) + low + k * 0.6931471803691238;
     return rest + (u >= 2.2250738585072014e-308 && u <= 1.7976931348623157e308 ? 0.0 : (double)NAN);
 }
 
@@ -90,8 +90,8 @@ static inline double phi_turned_sin(double u, double offset)
     const double shifted = (u * 0.3183098861837907 + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
 #endif
 #if PHI_CALLS_SIN || PHI_CALLS_COS
-    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
-    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    const double reduced = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
+    const double r = reduced - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
     uint64_t parity, bits; /* bits of shifted; the last bit is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;

@@ -59,9 +59,9 @@ static inline float phi_log_lane(float u)
     const float f = (m - 1.0f) / (m + 1.0f), q = f * f;
     sum = (other * q + sum) * q + 0.2f;
     sum = sum * q + 0.33333334f;
-    /* m - 1 is exact; the terms in small are small compared with it */
-    const float small = q * sum * 2.0f * f - k * 2.1219444e-4f;
-    const float rest = (m - 1.0f) - f * (m - 1.0f) + small + k * 0.693359375f;
+    /* m - 1 is exact; the terms in low are small compared with it */
+    const float low = q * sum * 2.0f * f - k * 2.1219444e-4f;
+    const float rest = (m - 1.0f) - f * (m - 1.0f) + low + k * 0.693359375f;
     return rest + (u >= FLT_MIN && u <= FLT_MAX ? 0.0f : (float)NAN);
 }
 
@@ -77,8 +77,8 @@ static inline float phi_turned_sin(float u, float offset)
     const float shifted = (u * 0.31830987f + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
 #endif
 #if PHI_CALLS_SIN || PHI_CALLS_COS
-    const float near = (u - k * 3.140625f) - k * 9.67502594e-4f;
-    const float r = (near - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
+    const float reduced = (u - k * 3.140625f) - k * 9.67502594e-4f;
+    const float r = (reduced - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
     uint32_t parity, bits; /* bits of shifted; the last bit is the parity of k */
     float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
     sum = sum * qq + -1.9841270e-4f;

@@ -90,11 +90,11 @@ phi_status phi_kick(phi_solver *s, const double *change);
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
-/* Save a run, and restore it so that it continues with the same bits. phi_saved writes *far, and arrays x[array][site];
-   it returns the number of arrays, at most that of fields, or three times that with compensated steps. To restore, call
-   phi_init, then phi_resume with these values. */
-size_t phi_saved(const phi_solver *s, double *x, size_t *far);
-phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far);
+/* Save a run, and restore it so that it continues with the same bits. phi_saved writes *full_range, and arrays
+   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with compensated steps. To
+   restore, call phi_init, then phi_resume with these values. */
+size_t phi_saved(const phi_solver *s, double *x, size_t *full_range);
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range);
 
 /* The physical time since phi_init, also s->t. Steps are equal in a time tau: h is a step in tau of the Hamiltonian K =
    log(A + e) - log(-B), where H = A + B. K is 0 along the trajectory, since phi_init and changes of the state set e = -H;

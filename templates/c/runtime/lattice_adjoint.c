@@ -154,15 +154,15 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
         if (end == steps) {
             phi_copy(g->end, s->x, s);
 #if !PHI_SERIES
-            g->last_far = s->far;
+            g->last_full_range = s->full_range;
 #endif
         }
         status = phi_segment_back(s, g, done, end, stride, steps, rows_bar, coef_bar);
         if (status == PHI_OK && !phi_all_hold(s, g->bar)) status = PHI_NOT_FINITE;
 #if PHI_RECOMPUTED
-        g->failed = status == PHI_NOT_FINITE && !g->far && !g->lost;
+        g->failed = status == PHI_NOT_FINITE && !g->full_range && !g->lost;
 #else
-        g->failed = status != PHI_OK && status != PHI_STOPPED && !g->far;
+        g->failed = status != PHI_OK && status != PHI_STOPPED && !g->full_range;
 #endif
         if (g->count > 1 && done == g->marks[2 * (g->count - 1)]) --g->count;
     }
@@ -170,7 +170,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
     phi_add_up(s, g, coef_bar);
 #endif
 #if PHI_NEAR
-    if (status == PHI_OK && !g->far && !phi_parameters_hold(s, g, coef_bar)) {
+    if (status == PHI_OK && !g->full_range && !phi_parameters_hold(s, g, coef_bar)) {
         g->failed = 1;
         status = PHI_NOT_FINITE;
     }
@@ -188,7 +188,7 @@ static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, siz
 #if PHI_SERIES
     s->shares = g->sums;
     s->handed = g->handed;
-    s->wide = g->far;
+    s->wide = g->full_range;
 #else
     s->open = 0;
 #endif
@@ -203,13 +203,13 @@ static int phi_begins_again(phi_solver *s, phi_transpose *g)
 {
 #if PHI_RECOMPUTED
     if (!g->failed && !g->lost) return 0;
-    if (!g->lost) g->far = 1;
+    if (!g->lost) g->full_range = 1;
     else if (g->leg > 1) g->leg = 1;
     else g->anew = 1;
     g->lost = 0;
 #else
     if (!g->failed) return 0;
-    g->far = 1;
+    g->full_range = 1;
 #endif
     g->failed = 0;
     g->count = 1;
@@ -233,7 +233,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 #if PHI_RECOMPUTED
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR
-    g.far = 1; /* there are no fast versions of functions, for small arguments only */
+    g.full_range = 1; /* there are no fast versions of functions, for small arguments only */
 #endif
 #endif
     status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);

@@ -56,7 +56,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
             phi_flow last;
             size_t count = 0;
             phi_set_flow(s, steps - 1, PHI_FLOWS - 1, &last);
-            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* applied here, since the reverse pass inverts it */
+            phi_sweep_part(s, last.part, last.coef PHI_AND_FULL_RANGE(g->full_range)); /* applied here, since the reverse pass inverts it */
 #if PHI_TAKES
             phi_hand_nothing(s, g, phi_number_of(steps, 0) + 1);
             phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
@@ -141,7 +141,7 @@ static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_
     }
     phi_copy(s->x, g->end, s);
     phi_copy(s->before, g->end, s);
-    s->far = g->last_far;
+    s->full_range = g->last_full_range;
     s->steps = g->first_step + steps;
     s->open = PHI_FLOWS > 1;
     if (s->open && !PHI_TRY_FLOWS) status = PHI_NOT_FINITE;

@@ -41,12 +41,12 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *tape P
     int now = 0;
     s->side = side;
     phi_predict(s, side PHI_AND_PREDICTOR);
-    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(1), 0.0, &now);
+    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FULL_RANGE(1), 0.0, &now);
     if (status != PHI_OK) {
         s->stiff = 1;
         now = 0;
         phi_predict(s, side PHI_AND_PREDICTOR);
-        status = phi_middle(s, coef PHI_AND_FAR(1), HUGE_VAL, &now);
+        status = phi_middle(s, coef PHI_AND_FULL_RANGE(1), HUGE_VAL, &now);
     }
     s->side = NULL;
     if (status != PHI_OK) return PHI_SINGULAR;

@@ -76,7 +76,7 @@ static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, d
             for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][PHI_SITE(i)];
         }
     }
-    phi_back_rows(s, kernel, coef PHI_AND_FAR(s->wide), v, to, s->shares + (coef - s->coef), first, end);
+    phi_back_rows(s, kernel, coef PHI_AND_FULL_RANGE(s->wide), v, to, s->shares + (coef - s->coef), first, end);
 #if PHI_HANDS
     if (!phi_hands[kernel - 1]) return;
     phi_wait();

@@ -27,11 +27,11 @@ phi_status phi_begin(phi_solver *s, double h) { return phi_set_step(s, h); }
 /* Number of rows in a plane. */
 static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / s->sizes[0]; }
 
-phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
+phi_status phi_sweep(phi_solver *s, size_t number, int full_range, size_t from, size_t to)
 {
     if (s == NULL || !s->prepared || number >= PHI_NUMBERED || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
 #if !PHI_NEAR
-    (void)far;
+    (void)full_range;
 #endif
     const int part = phi_flow_parts[number];
 #if PHI_RENEWED
@@ -55,7 +55,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #if PHI_NOISE
     if (drawing) phi_draw_pieces(s, s->steps, number > 0, 0, units);
 #endif
-    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), 0, units);
+    phi_sweep_rows(s, part, coef PHI_AND_FULL_RANGE(full_range), 0, units);
     s->from = 0;
     s->to = s->length;
 #if PHI_HALO
@@ -65,7 +65,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #if PHI_NOISE
     if (drawing) phi_draw_pieces(s, s->steps, number > 0, from * units, to * units);
 #endif
-    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), from * units, to * units);
+    phi_sweep_rows(s, part, coef PHI_AND_FULL_RANGE(full_range), from * units, to * units);
 #endif
     return PHI_OK;
 }

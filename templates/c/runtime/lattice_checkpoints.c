@@ -155,7 +155,7 @@ static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
     phi_copy(fields, s->x, s);
     g->marks[2 * g->count] = done;
 #if !PHI_SERIES
-    g->marks[2 * g->count + 1] = s->far;
+    g->marks[2 * g->count + 1] = s->full_range;
 #endif
     ++g->count;
 }
@@ -172,7 +172,7 @@ static size_t phi_return(phi_solver *s, const phi_transpose *g)
     phi_forget(s);
 #else
     phi_copy(s->before, fields, s);
-    s->far = g->marks[2 * (g->count - 1) + 1];
+    s->full_range = g->marks[2 * (g->count - 1) + 1];
     s->steps = g->first_step + done;
     s->open = PHI_FLOWS > 1 && done > 0;
 #endif

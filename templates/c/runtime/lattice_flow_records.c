@@ -28,6 +28,6 @@ static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
     phi_flow flow;
     phi_set_flow(s, steps, number, &flow);
-    phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
+    phi_sweep_part(s, flow.part, flow.coef PHI_AND_FULL_RANGE(s->full_range > 0));
 }
 #endif

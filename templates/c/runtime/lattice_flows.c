@@ -8,16 +8,16 @@
 /* ---- The flows ---- */
 enum { PHI_STRETCH = 32 }; /* steps between checks for finite values */
 #if PHI_NEAR
-enum { PHI_FAR_STEPS = 64 }; /* number of steps with functions for arguments of any size, after a step that needed them */
+enum { PHI_FULL_RANGE_STEPS = 64 }; /* number of steps with functions for arguments of any size, after a step that needed them */
 #endif
 
 #if PHI_SHARED
 #if PHI_BY_COLOUR
 /* Apply one flow, of a part of H or of its terms at sites of one colour; called by all threads together. */
-static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
+static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FULL_RANGE)
 #else
 /* Apply the flow of one part of H; called by all threads together. */
-static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
+static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FULL_RANGE)
 #endif
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -30,23 +30,23 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
     }
 #endif
     if (part == PHI_REMAINDER) phi_gather_pulls(s, coef, first, end);
-    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), first, end);
+    phi_sweep_rows(s, part, coef PHI_AND_FULL_RANGE(full_range), first, end);
     phi_wait();
 }
 
 #endif
 #if PHI_BY_COLOUR
 /* Apply flows of a step that has one for each colour: 0 first, 1 inner, 2 last, 3 inner in reverse. */
-static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
+static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FULL_RANGE)
 {
 #if PHI_TIMED
     const int last = s->flows; /* the last flow advances the time */
 #else
     const int last = s->flows - 1;
 #endif
-    if (kind % 2 == 0) phi_sweep_colour(s, kind == 0 ? 0 : last, coef PHI_AND_FAR(far));
+    if (kind % 2 == 0) phi_sweep_colour(s, kind == 0 ? 0 : last, coef PHI_AND_FULL_RANGE(full_range));
     for (int flow = 1; kind % 2 == 1 && flow < last; ++flow)
-        phi_sweep_colour(s, kind == 1 ? flow : last - flow, coef PHI_AND_FAR(far));
+        phi_sweep_colour(s, kind == 1 ? flow : last - flow, coef PHI_AND_FULL_RANGE(full_range));
 }
 
 #endif
@@ -91,7 +91,7 @@ static void phi_steps(const phi_solver *s, size_t steps)
 #if PHI_RENEWED
             phi_apply_flow(s, step, flow);
 #else
-            phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FAR(s->far > 0));
+            phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FULL_RANGE(s->full_range > 0));
 #endif
         }
 #elif PHI_CORRECTED
@@ -144,10 +144,10 @@ static int phi_try(phi_solver *s, size_t steps)
 static int phi_close(phi_solver *s)
 {
     if (phi_try(s, 0)) return 1;
-    const size_t far = s->far;
-    s->far = 1;
+    const size_t full_range = s->full_range;
+    s->full_range = 1;
     const int done = phi_try(s, 0);
-    s->far = far;
+    s->full_range = full_range;
     return done;
 }
 
@@ -164,12 +164,12 @@ static phi_status phi_march(phi_solver *s, size_t steps)
     for (size_t stretch = PHI_STRETCH; s->steps < end;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
 #if PHI_NEAR
-        if (s->far > 0 && s->far < now) now = s->far;
+        if (s->full_range > 0 && s->full_range < now) now = s->full_range;
 #endif
         if (!phi_try(s, now)) {
 #if PHI_NEAR
-            if (now == 1 && s->far > 0) return PHI_NOT_FINITE;
-            if (now == 1) s->far = PHI_FAR_STEPS; /* the fast functions give NaN if an argument is too large */
+            if (now == 1 && s->full_range > 0) return PHI_NOT_FINITE;
+            if (now == 1) s->full_range = PHI_FULL_RANGE_STEPS; /* the fast functions give NaN if an argument is too large */
             stretch = now > 1 ? 1 : PHI_STRETCH;
 #else
             if (now == 1) return PHI_NOT_FINITE;
@@ -186,7 +186,7 @@ static phi_status phi_march(phi_solver *s, size_t steps)
         s->open = PHI_FLOWS > 1;
 #endif
 #if PHI_NEAR
-        s->far -= s->far > 0 ? now : 0;
+        s->full_range -= s->full_range > 0 ? now : 0;
 #endif
     }
     return PHI_OK;

@@ -11,7 +11,7 @@ static void phi_multiply(const phi_solver *s, const double *coef, int now, doubl
     const double by = 0x1p-26 * sqrt((double)(PHI_DIM * s->sites));
     phi_combine(s, s->y[2], 1.0, s->y[now], by, v);
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FAR(1), s->y[2], to, unit);
+    for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FULL_RANGE(1), s->y[2], to, unit);
     phi_combine(s, to, 1.0 / by, s->y[1 - now], -1.0 / by, to);
     phi_combine(s, to, 1.0, v, 1.0, to);
 }

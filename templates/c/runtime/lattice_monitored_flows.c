@@ -15,7 +15,7 @@ static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
     (void)steps;
     phi_carry_vectors(s, part, time, rate);
     phi_prepare(&s->params, time PHI_AND_ON_TIME, coef);
-    phi_sweep_part(s, part, coef PHI_AND_FAR(s->far > 0));
+    phi_sweep_part(s, part, coef PHI_AND_FULL_RANGE(s->full_range > 0));
     if (part != PHI_NEGATIVE && PHI_THREAD == 0) phi_pass(s, time);
 }
 #endif

@@ -38,35 +38,35 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
 #if PHI_BANDED
     if (s->factored != coef && !phi_factorise(s, coef, now)) return HUGE_VAL;
     s->factored = coef;
-    if (!isfinite(phi_relaxed(s, coef PHI_AND_FAR(1), now))) return HUGE_VAL;
+    if (!isfinite(phi_relaxed(s, coef PHI_AND_FULL_RANGE(1), now))) return HUGE_VAL;
     phi_eliminate(s, now);
 #else
-    if (!isfinite(phi_relaxed(s, coef PHI_AND_FAR(1), now))) return HUGE_VAL;
+    if (!isfinite(phi_relaxed(s, coef PHI_AND_FULL_RANGE(1), now))) return HUGE_VAL;
     phi_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
 #if PHI_SITE_BLOCKS
     phi_invert_blocks(s, coef, now);
 #endif
     if (!isfinite(phi_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
 #endif
-    return phi_relaxed(s, NULL PHI_AND_FAR(1), now);
+    return phi_relaxed(s, NULL PHI_AND_FULL_RANGE(1), now);
 }
 
 /* Largest accepted distance of a solution from x: farther away, solutions are unrelated to the motion. */
 static double phi_range(phi_solver *s, const double *coef)
 {
     phi_copy(s->y[0], s->x, s);
-    phi_relaxed(s, coef PHI_AND_FAR(1), 0);
+    phi_relaxed(s, coef PHI_AND_FULL_RANGE(1), 0);
     return PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
 }
 
 
 /* Solve the equation of a stage for y to rounding level, from the prediction in s->y[0]: by fixed-point sweeps or, if
    s->stiff, by Newton corrections, whose result must not be farther than range from x. The solution is s->y[*now]. */
-static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, double range, int *now)
+static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_RANGE, double range, int *now)
 {
     double before = 0.0;
     for (int count = 0; count < PHI_MOST_SWEEPS; ++count) {
-        const double change = s->stiff ? phi_corrected(s, coef, *now) : phi_relaxed(s, coef PHI_AND_FAR(far), *now);
+        const double change = s->stiff ? phi_corrected(s, coef, *now) : phi_relaxed(s, coef PHI_AND_FULL_RANGE(full_range), *now);
         const double shrunk = before - change;
         const phi_status failed = count == 0 && !s->stiff ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
         ++s->sweeps;

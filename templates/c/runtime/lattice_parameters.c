@@ -15,7 +15,7 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     phi_put_at_bonds(s, params);
     s->prepared = 0; /* so that the next step computes all coefficients */
     PHI_NOT_OPEN(s)
-    PHI_NOT_FAR(s)
+    PHI_NOT_FULL_RANGE(s)
     phi_clear_carry(s);
 #if PHI_BODIES
     if (!phi_weigh(s)) return PHI_BAD_ARGUMENT;

@@ -13,10 +13,10 @@ static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 #if PHI_RENEWED
     double coef[PHI_ROW];
     phi_renew(s, number, steps, coef);
-    phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
+    phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FULL_RANGE(s->full_range > 0));
 #else
     (void)steps;
-    phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
+    phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FULL_RANGE(s->full_range > 0));
 #endif
 #if PHI_BODIES && PHI_SHARED
     if (phi_flow_parts[number] == PHI_REMAINDER || PHI_THREAD > 0) return;

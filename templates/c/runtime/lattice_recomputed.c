@@ -14,20 +14,20 @@ static void phi_reverse_flow(const phi_solver *s, const phi_flow *flow, size_t f
 {
     const phi_transpose *g = flow->g;
 #if PHI_TAKES
-    phi_back_rows(s, phi_ways[flow->row], flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, phi_handed_by(g, (size_t)flow->go - 1),
+    phi_back_rows(s, phi_ways[flow->row], flow->coef PHI_AND_FULL_RANGE(g->full_range), s->x, flow->bar, phi_handed_by(g, (size_t)flow->go - 1),
         phi_handed_by(g, (size_t)flow->go), g->sums + flow->row * PHI_ROW, first, end);
 #else
 #if PHI_HANDS
     if (flow->go > 1) {
 #if PHI_GATHER
-        phi_hand_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+        phi_hand_rows(s, flow->part, flow->coef PHI_AND_FULL_RANGE(g->full_range), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #else
         phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
 #endif
         return;
     }
 #endif
-    phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+    phi_back_rows(s, flow->part, flow->coef PHI_AND_FULL_RANGE(g->full_range), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #endif
 }
 
@@ -131,7 +131,7 @@ static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t bef
             size_t count = 0;
             for (int number = 0; number <= last; ++number) {
                 phi_set_flow(s, before, phi_joined(number, before > g->first_step), &flow);
-                phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(g->far));
+                phi_sweep_part(s, flow.part, flow.coef PHI_AND_FULL_RANGE(g->full_range));
             }
 #if PHI_TAKES
             if (last == PHI_OWN_FLOWS - 1) phi_hand_nothing(s, g, phi_number_of(before + 1, 0));
@@ -162,12 +162,12 @@ static double phi_largest_of(const phi_solver *s, const double *field)
 /* Whether two fields differ by no more than `most` at each site. */
 static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
 {
-    int near = 1;
+    int agree = 1;
     PHI_EACH_ROW {
         const double *first = PHI_ROW_AT(one), *second = PHI_ROW_AT(other);
-        for (ptrdiff_t i = 0; i < s->length; ++i) near &= fabs(first[i] - second[i]) <= most;
+        for (ptrdiff_t i = 0; i < s->length; ++i) agree &= fabs(first[i] - second[i]) <= most;
     }
-    return near;
+    return agree;
 }
 
 /* Set the state to that stored at the start of a leg, after all its steps have been recomputed; fails if the recomputed state
@@ -181,7 +181,7 @@ static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t le
         largest = size > largest ? size : largest;
     }
     if (!phi_all_hold(s, s->x)) {
-        g->lost = g->far && !g->anew;
+        g->lost = g->full_range && !g->anew;
         return PHI_NOT_FINITE;
     }
     for (size_t f = 0; f < PHI_DIM; ++f)

@@ -4,9 +4,9 @@
 #include "model.h"
 #include "rows.c"
 
-size_t phi_saved(const phi_solver *s, double *x, size_t *far)
+size_t phi_saved(const phi_solver *s, double *x, size_t *full_range)
 {
-    *far = s->far;
+    *full_range = s->full_range;
     phi_take(s, s->carry, x);
     if (!s->open) return PHI_DIM;
     phi_take(s, s->before, x + PHI_DIM * s->sites);
@@ -14,12 +14,12 @@ size_t phi_saved(const phi_solver *s, double *x, size_t *far)
     return 3 * PHI_DIM;
 }
 
-phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far)
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range)
 {
     if (s == NULL || (fields != 0 && fields != PHI_DIM && fields != 3 * PHI_DIM)) return PHI_BAD_ARGUMENT;
     if (fields > 0 && (x == NULL || !phi_finite(x, fields * s->sites))) return PHI_BAD_ARGUMENT;
     if (phi_set_step(s, h) != PHI_OK) return PHI_BAD_ARGUMENT;
-    s->far = far;
+    s->full_range = full_range;
     for (size_t k = 0; k < fields; ++k) {
         double *const array = k < PHI_DIM ? s->carry[k] : k < 2 * PHI_DIM ? s->before[k - PHI_DIM] : s->carry[k - PHI_DIM];
         phi_put(s, array, x + k * s->sites);

@@ -3,17 +3,17 @@
 #include "lattice.h"
 #include "model.h"
 
-size_t phi_saved(const phi_solver *s, double *x, size_t *far)
+size_t phi_saved(const phi_solver *s, double *x, size_t *full_range)
 {
     (void)x;
-    *far = s->far;
+    *full_range = s->full_range;
     return 0;
 }
 
-phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far)
+phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range)
 {
     if (x != NULL || fields != 0 || phi_set_step(s, h) != PHI_OK) return PHI_BAD_ARGUMENT;
-    s->far = far;
+    s->full_range = full_range;
     return PHI_OK;
 }
 #endif

@@ -13,9 +13,9 @@ static void phi_find_seams(phi_solver *s)
         const ptrdiff_t size = (ptrdiff_t)s->sizes[a], period = phi_seams[a][0], left = size % period;
         s->seams[a] = size - left;
         while (left > 0 && size - s->seams[a] < phi_seams[a][1]) s->seams[a] -= period;
-        const ptrdiff_t near = left > 0 ? phi_seams[a][2] : 0;
-        s->inside[0] = near;
-        s->inside[1] = s->seams[a] - near;
+        const ptrdiff_t width = left > 0 ? phi_seams[a][2] : 0;
+        s->inside[0] = width;
+        s->inside[1] = s->seams[a] - width;
     }
 }
 

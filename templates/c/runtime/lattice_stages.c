@@ -62,7 +62,7 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
 /* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns the largest
    change of a field relative to its size, not finite if y is not. */
 #endif
-static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int now)
+static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FULL_RANGE, int now)
 {
     const size_t units = phi_units(s);
     double change[PHI_DIM] = { 0.0 }, size[PHI_DIM] = { 0.0 }, largest = 0.0, largest_change = 0.0;
@@ -74,7 +74,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
 #endif
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) phi_stage_piece(s, coef PHI_AND_FAR(far), s->y[now], s->y[1 - now], unit);
+        if (coef != NULL) phi_stage_piece(s, coef PHI_AND_FULL_RANGE(full_range), s->y[now], s->y[1 - now], unit);
         phi_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
@@ -108,7 +108,7 @@ static double *phi_store_stage(const phi_solver *s, int now, double *to)
 }
 
 /* Make all stages of a step: solve for y, and add the increment to x. */
-static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
+static phi_status phi_stages(phi_solver *s PHI_AND_INT_FULL_RANGE)
 {
     const size_t units = phi_units(s);
 #if PHI_ADJOINT
@@ -132,9 +132,9 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 #endif
         int now = 0;
         phi_predict(s, s->x PHI_AND_PREDICTOR);
-        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(far), 0.0, &now);
+        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FULL_RANGE(full_range), 0.0, &now);
 #if PHI_NEAR
-        if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
+        if (status != PHI_OK && (full_range || status != PHI_NOT_FINITE)) {
 #else
         if (status != PHI_OK) {
 #endif
@@ -142,7 +142,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
             now = 0;
             const double range = phi_range(s, coef);
             phi_predict(s, s->x PHI_AND_PREDICTOR);
-            status = phi_middle(s, coef PHI_AND_FAR(far), range, &now);
+            status = phi_middle(s, coef PHI_AND_FULL_RANGE(full_range), range, &now);
         }
 #if PHI_TANGENT
         for (size_t k = 0; k < s->vectors && status == PHI_OK; ++k) status = phi_vary(s, coef, now, k);
@@ -155,7 +155,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
         phi_remember(s, s->x PHI_AND_STAGE, now);
 #endif
         PHI_EACH_PIECE
-        for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FAR(far), s->y[now], s->x, unit);
+        for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FULL_RANGE(full_range), s->y[now], s->x, unit);
     }
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }
@@ -169,7 +169,7 @@ static phi_status phi_try(phi_solver *s)
     phi_copy(s->x, s->before, s);
     phi_forget(s);
 #endif
-    const phi_status status = phi_stages(s PHI_AND_FAR(1));
+    const phi_status status = phi_stages(s PHI_AND_FULL_RANGE(1));
     if (status == PHI_OK) return status;
     phi_copy(s->x, s->before, s);
     phi_forget(s);

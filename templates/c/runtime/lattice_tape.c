@@ -44,9 +44,9 @@ static void phi_make_steps_with_tape(const phi_solver *s, size_t steps)
             for (int k = 0, sweep; (sweep = phi_sweep_of(s, merged_number, k)) >= 0; ++k) {
                 tape = phi_store_fields(s, sweep, tape);
 #if PHI_BY_COLOUR
-                phi_sweep_colour(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
+                phi_sweep_colour(s, sweep, flow.coef PHI_AND_FULL_RANGE(s->full_range > 0));
 #else
-                phi_sweep_part(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
+                phi_sweep_part(s, sweep, flow.coef PHI_AND_FULL_RANGE(s->full_range > 0));
 #endif
             }
         }
@@ -58,12 +58,12 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
     double *const *x, double *const *bar)
 {
     size_t first, end = phi_share(phi_units(s), &first);
-    phi_back_rows(s, sweep, coef PHI_AND_FAR(g->far), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+    phi_back_rows(s, sweep, coef PHI_AND_FULL_RANGE(g->full_range), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
     if (!phi_hands[phi_part_of(s, sweep)]) return;
     phi_wait();
 #if PHI_GATHER
-    phi_hand_rows(s, sweep, coef PHI_AND_FAR(g->far), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+    phi_hand_rows(s, sweep, coef PHI_AND_FULL_RANGE(g->full_range), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #else
     phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
 #endif

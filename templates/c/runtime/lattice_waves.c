@@ -42,9 +42,9 @@ static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t fr
 #endif
 #if PHI_RECOMPUTED
     if (flow->go > 0) phi_reverse_flow(s, flow, from, to);
-    else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
+    else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FULL_RANGE(s->full_range > 0), from, to);
 #else
-    phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
+    phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FULL_RANGE(s->full_range > 0), from, to);
 #endif
 }
 
@@ -76,7 +76,7 @@ static void phi_make_waves(const phi_solver *s, size_t steps)
             phi_set_flow(s, s->steps + done / each, joined ? PHI_FLOWS : number, flows + count);
         }
         if (count > 1) phi_make_wave(s, flows, count);
-        else phi_sweep_part(s, flows->part, flows->coef PHI_AND_FAR(s->far > 0));
+        else phi_sweep_part(s, flows->part, flows->coef PHI_AND_FULL_RANGE(s->full_range > 0));
     }
 }
 #endif

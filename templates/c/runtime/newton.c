@@ -57,17 +57,17 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         double factor[PHI_ELEMENT]; /* computed here, so that the processor overlaps it with the lines below */
         phi_factor(s PHI_AND_STAGE, y, factor);
 #endif
-        double small[PHI_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
+        double rest[PHI_DIM] = { 0.0 }; /* correction of the increment, plus the compensation term */
         for (int i = 0; i < PHI_DIM; ++i)
-            for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
-        for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];
+            for (int j = 0; j < PHI_DIM; ++j) rest[i] -= slope[i * PHI_DIM + j] * delta[j];
+        for (int i = 0; i < PHI_DIM; ++i) rest[i] += s->carry[i];
         if (!phi_plausible(s PHI_AND_STAGE, increment)) return PHI_NO_CONVERGENCE;
 #if PHI_MONITOR
         double elapsed[1];
         phi_elapsed(PHI_OF(s->coef, stage), y, elapsed);
         if (!(elapsed[0] * (PHI_FRACTION(s->h)) > 0.0)) return PHI_NOT_FINITE;
 #endif
-        if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
+        if (!phi_advance(s, increment, rest)) return PHI_NOT_FINITE;
         PHI_PASS(s, elapsed[0])
         phi_remember(&PHI_OF(s->history, stage), y PHI_AND_ITERATION);
 #if PHI_ATTITUDE

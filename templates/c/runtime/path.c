@@ -33,7 +33,7 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     double mean[PHI_DIM])
 {
     double series[PHI_SERIES][PHI_TERMS + 1], fixed[PHI_FIXED], end[PHI_DIM], slope[PHI_DIM], norm = 0.0;
-    int small = 0;
+    int small_terms = 0;
     for (int i = 0; i < PHI_DIM; ++i) {
         series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
@@ -52,8 +52,8 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
             const double measure = fabs(start[i]) + fabs(change[i]) + PHI_LEAST_SHARE * norm;
             if (!(fabs(term) <= PHI_NEGLIGIBLE * measure)) negligible = 0;
         }
-        small = negligible ? small + 1 : 0;
-        if (small >= 2 && phi_holds(coef, p, end, slope)) return 1;
+        small_terms = negligible ? small_terms + 1 : 0;
+        if (small_terms >= 2 && phi_holds(coef, p, end, slope)) return 1;
     }
     return 0;
 }

@@ -88,10 +88,10 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
     for (int a = 0; a < PHI_AXES - 1; ++a) row.colour = (int)((row.colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
 #endif
 #if PHI_SEAMS
-    row.near = 0;
+    row.near_seams = 0;
     for (int a = 0; a < PHI_AXES - 1; ++a) {
-        const ptrdiff_t near = s->seams[a] < (ptrdiff_t)s->sizes[a] ? phi_seams[a][2] : 0;
-        if (place[a] < near || place[a] >= s->seams[a] - near) row.near |= 1 << a;
+        const ptrdiff_t width = s->seams[a] < (ptrdiff_t)s->sizes[a] ? phi_seams[a][2] : 0;
+        if (place[a] < width || place[a] >= s->seams[a] - width) row.near_seams |= 1 << a;
     }
 #endif
     return row;

@@ -30,7 +30,7 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {
     double series[PHI_TANGENT_SERIES][PHI_TERMS + 1], fixed[PHI_TANGENT_FIXED], end[2 * PHI_DIM], slope[2 * PHI_DIM], norm[2] = { DBL_MIN, DBL_MIN };
-    int small = 0;
+    int small_terms = 0;
     for (int i = 0; i < 2 * PHI_DIM; ++i) {
         series[i][0] = start[i];
         change[i] = mean[i] = slope[i] = 0.0;
@@ -48,8 +48,8 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
             end[i] = start[i] + change[i];
             if (!(fabs(term) <= PHI_TANGENT_NEGLIGIBLE * (norm[i / PHI_DIM] + fabs(change[i])))) negligible = 0;
         }
-        small = negligible ? small + 1 : 0;
-        if (small >= 2 && phi_tangent_holds(coef, p, end, slope)) return 1;
+        small_terms = negligible ? small_terms + 1 : 0;
+        if (small_terms >= 2 && phi_tangent_holds(coef, p, end, slope)) return 1;
     }
     return 0;
 }

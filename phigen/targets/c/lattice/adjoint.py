@@ -189,11 +189,11 @@ class _Reverse(RowLoops):
         number.
         """
         step, back = self.layout.step, name == "back_rows"
-        far = ["coef", *["far"] * bool(self.rows.limited)]
+        full_range = ["coef", *["full_range"] * bool(self.rows.limited)]
         arrays = ["x", "bar", "handed", *["received"] * (back and takes(self.program, step))]
-        parameters = [*far, *arrays, "sums"] if back or step.partners else arrays
+        parameters = [*full_range, *arrays, "sums"] if back or step.partners else arrays
         if step.equation:
-            parameters = [*far, "v", "bar", "sums"] if back else ["bar", *["numbers"] * bool(step.partners)]
+            parameters = [*full_range, "v", "bar", "sums"] if back else ["bar", *["numbers"] * bool(step.partners)]
         parameters.insert(0, "flow" if step.by_colour else "part")
         build = self.row_drivers
         return commented(build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True), self.program)

@@ -236,8 +236,8 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         )
         yield "REMAINDER", 1 + bodies.remainder, "the part of H besides the Kepler motions"
     if has["WAVES"]:
-        far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
-        span = max(1, *far) if several else 1
+        distances = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
+        span = max(1, *distances) if several else 1
         yield "SPAN", span, "slices that a flow reads on each side of a slice, for wavefront blocking"
     if layout.lattice.weights and several:
         yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that reach beyond open ends"

@@ -143,14 +143,14 @@ class _PartLoops:
             "tangent_rows" if self.varied else f"sweep_{'colour' if coloured else 'part'}" if threads else "sweep_rows"
         )
         parameters = ["flow" if coloured else "part", "coef", *["v"] * self.varied]
-        parameters += ["far"] * (self.rows is not None and bool(self.rows.limited))
+        parameters += ["full_range"] * (self.rows is not None and bool(self.rows.limited))
         cases, build = list[RowSegment | ir.Block](), drivers(self.loops)
         for k, forms in enumerate(calls_of_parts):
             if not self.by_part:
                 cases.append(self._segment(k, forms, names))
                 continue
             for form in sorted(forms):
-                title = f"The flow of H_{k + 1}" + ", with full-range functions" * (form == "_far")
+                title = f"The flow of H_{k + 1}" + ", with full-range functions" * (form == "_full_range")
                 case = self._segment(k, {form: forms[form]}, names)
                 yield commented(build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]), program)
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
@@ -285,7 +285,7 @@ def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]
     seams only.
     """
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
-    rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near")
+    rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near_seams")
     if rows.value:
         yield ir.If(ir.Binary("!=", ir.Binary("&", near, rows), rows), (ir.Continue(),))
     if window >> last:
@@ -379,8 +379,8 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
     updated = range(program.dimension) if kernel.role in (Role.RELAX, Role.FOLLOW) else ()
     calls = (*gathered, *row_drivers.in_forms(blocks))
     case = RowSegment(calls, tuple(setup), updated=updated, arrays=ir.fixed("to"))
-    far = rows is not None and bool(rows.limited)
-    parameters = ["coef", *["far"] * far, "y", *["v"] * varied, "to"]
+    full_range = rows is not None and bool(rows.limited)
+    parameters = ["coef", *["full_range"] * full_range, "y", *["v"] * varied, "to"]
     name = "stage_piece" if end else f"{kernel.name}_piece"
     yield commented(drivers(loops).driver(name, _TITLES[kernel.role], parameters, [case], alone=True), program)
 

@@ -1,5 +1,5 @@
-#ifndef PHI_FILE_ADJOINT_SEGMENTS_FAR
-#define PHI_FILE_ADJOINT_SEGMENTS_FAR
+#ifndef PHI_FILE_ADJOINT_SEGMENTS_FULL_RANGE
+#define PHI_FILE_ADJOINT_SEGMENTS_FULL_RANGE
 #include <string.h>
 
 #include "adjoint_segments.c"
@@ -20,11 +20,11 @@ static int phi_pull_finite(const phi_group *group)
    further steps, and return 0. */
 static int phi_pull_steps(phi_group *group, int steps, const phi_back_group *bar)
 {
-    if (group->far) phi_steps_far_lanes(group, steps);
+    if (group->full_range) phi_steps_full_range_lanes(group, steps);
     else phi_steps_lanes(1, group, steps);
-    if (group->far || phi_pull_finite(group)) return 1;
+    if (group->full_range || phi_pull_finite(group)) return 1;
     memcpy(group->pack, bar->start, sizeof bar->start);
-    group->far = 1;
+    group->full_range = 1;
     return 0;
 }
 #endif
