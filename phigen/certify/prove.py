@@ -41,12 +41,12 @@ GROWTH = 1.25
 #: at most 2 units.
 GAUSS_CARRY = 3.03
 
-#: For a Gauss step, an iterate has one bound for each unknown: the bound for its distance from the solution. All bounds
-#: are at least this fraction of the largest one, since each iteration couples all unknowns.
+#: In a Gauss step, each unknown has a bound for the distance of its iterates from the solution. All bounds are at least
+#: this fraction of the largest one, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
-#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns. It is needed if the
-#: C uses difference quotients, and is larger than the differences of the unknowns in these quotients.
+#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for C with
+#: difference quotients. The addition is larger than the differences of the unknowns in these quotients.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.

@@ -22,7 +22,7 @@ BITS = 300
 #: corrections use the same matrix.
 CORRECTIONS = 400
 
-#: If all corrections of the unknowns are smaller than this, the equation of a stage counts as solved.
+#: The equation of a stage counts as solved if all corrections of the unknowns are smaller than this number.
 SOLVED = 1e-40
 
 Numbers = Sequence[Any]

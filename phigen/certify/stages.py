@@ -38,7 +38,9 @@ class Listing:
         return len(self.operations) - 1
 
     def input(self, *operation: Any) -> int:
-        """Return the index of an operation that reads an input; it is appended if the input was not read before."""
+        """Return the index of the operation that reads an input. The operation is appended if the input was not read
+        before.
+        """
         if operation not in self._inputs:
             self._inputs[operation] = self.add(*operation)
         return self._inputs[operation]
@@ -336,7 +338,7 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append operations that compute thresholds. The C neglects a term of a Taylor series if it is below its
+    """Append operations that compute thresholds for terms of a Taylor series. The C neglects a term below its
     threshold.
 
     Returns pairs of indices for the given ``orders``: a term, and its threshold.

@@ -39,9 +39,10 @@ MOST_TERMS = 2000
 
 
 def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the star algebra of a simple Lie algebra, or of the sum of a simple and a one-dimensional Lie algebra.
+    """Return the star algebra of a simple Lie algebra, or of the sum of a simple and a one-dimensional Lie
+    algebra.
 
-    Returns None if it does not exist, or if it exceeds MOST_UNKNOWNS or MOST_TERMS.
+    Returns None if there is no star algebra of this kind, or only one that exceeds MOST_UNKNOWNS or MOST_TERMS.
     """
     field, m = lie.field, lie.dimension
     if not field.is_rational or m > MOST_SIMPLE:
@@ -133,7 +134,7 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
     """Yield the candidates for the module S of symmetric elements in a star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-    They are the modules that exist for a Lie algebra g of this dimension. Modules with the smallest A come first.
+    Candidates are the modules that exist for a Lie algebra g of this dimension. Modules with the smallest A come first.
     ``ad`` are the adjoint matrices of g, and ``centre`` is the dimension of the centre of g.
     """
     m = len(ad)
@@ -252,7 +253,7 @@ class _Module:
     ) -> tuple[fmpq, fmpq, fmpq] | None:
         """Return the factors c, μ, ν in the products of the star algebra; see the head of the module.
 
-        They solve linear equations for a few pairs of elements of the Lie algebra. Returns None if there is no
+        The factors solve linear equations for a few pairs of elements of the Lie algebra. Returns None if there is no
         solution. A solution may still violate axioms of a star algebra; `enveloping` checks these at the end.
         """
         m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()

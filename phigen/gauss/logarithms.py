@@ -22,7 +22,7 @@ def logarithmic(coordinates: Sequence[str], poisson: Matrix) -> Rates | None:
     """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j), if all brackets are constant in suitable
     logarithms.
 
-    This is so if {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and exponents e_i = 0 or 1. The result has the
+    The condition is {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and exponents e_i = 0 or 1. The result has the
     brackets for all i with e_i = 1. Returns None if there are no such exponents.
     """
     pairs = [(i, j) for i, row in enumerate(poisson) for j in range(i) if not row[j].is_zero]

@@ -382,8 +382,8 @@ def vector_field(
     derivatives += [ZERO] * (len(points.unknowns) - len(derivatives))
     rates = [-weight * value for value in substitute(slopes, stage_values)]
     for group, at in zip(realisation.groups, points.places, strict=True):
-        # If the last basis element stands for the constant 1, it has no rate. It is central, so it would not act
-        # anyway.
+        # If the last basis element stands for the constant 1, this element has no rate. No rate is needed, since the
+        # element is central.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
         if collected:
             sums = _collected(points, group, at, slopes, weight)
@@ -481,10 +481,11 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return the vectors y with x̃(q) = y·Im q for all copies of the quaternions in star algebras.
+    """Return the vectors y with x̃(q) = y·Im q for all copies of the quaternions in star algebras, as a single
+    list.
 
-    The result is a single list. It has three components for each copy, in the order of i, j, k. At the start of a step,
-    the frame F satisfies F* k F = y (`phigen.gauss.lift`).
+    The list has three components for each copy, in the order of i, j, k. At the start of a step, the frame F satisfies
+    F* k F = y (`phigen.gauss.lift`).
     """
     values: list[Expression] = []
     for group in points.realisation.groups:

@@ -80,7 +80,7 @@ class Tableau:
 
     @property
     def defects(self) -> list[Fraction]:
-        """The values μ_ij + μ_ji − 1 for j ≤ i in exact arithmetic. They are all 0, so that the method is
+        """The values μ_ij + μ_ji − 1 for j ≤ i in exact arithmetic. All values are 0, so that the method is
         symplectic.
         """
         mu = [[Fraction(v) for v in row] for row in self.mixing]
@@ -108,11 +108,11 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
 def continuation(stages: int) -> list[list[float]]:
     """Return the matrix that predicts the stages of a step by the collocation polynomial of the last step.
 
-    It has the form of ``prediction`` of `Tableau`. Solvers with loops over the stages use it, in C, JavaScript and
-    NumPy. It was compared with the second predictor of `BANDS` in ten systems at orders 4 to 16. The numbers of
-    iterations in a step were equal within 6 %, except for small steps, where it needed up to 25 % fewer. The matrix
-    reads only the last step. So derivatives of earlier steps need no change of frame, and a kick between earlier steps
-    does not spoil the prediction.
+    The matrix has the form of ``prediction`` of `Tableau`. Solvers with loops over the stages use this matrix, in C,
+    JavaScript and NumPy. In ten systems at orders 4 to 16, the numbers of iterations in a step were those with the
+    second predictor of `BANDS`, within 6 %. At small steps they were up to 25 % smaller. The matrix reads only the last
+    step. So derivatives of earlier steps need no change of frame, and a kick between earlier steps does not spoil the
+    prediction.
     """
     weights, _ = _exact(stages)
     nodes = gauss_nodes(stages)
@@ -238,10 +238,12 @@ def _prediction(
     band: tuple[Fraction, int],
     noise: Fraction,
 ) -> list[list[Fraction]]:
-    """Return the matrix of a predictor for the stages of a Gauss step, from the stage increments of previous steps.
+    """Return the matrix of a predictor for the stages of a Gauss step, from the stage increments of previous
+    steps.
 
-    It is μ diag(b) W diag(1/b) with the coefficients of the method, where W extrapolates derivatives from the previous
-    steps to the next step. ``band`` is an entry of `BANDS`, and ``noise`` is the relative error of known derivatives.
+    The matrix is μ diag(b) W diag(1/b), with the coefficients μ and b of the method. W extrapolates derivatives from
+    the previous steps to the next step. ``band`` is an entry of `BANDS`, and ``noise`` is the relative error of known
+    derivatives.
     """
     n, (width, step_count) = len(nodes), band
     known_times = [c - steps_back for steps_back in range(1, step_count + 1) for c in nodes]

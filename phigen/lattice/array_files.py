@@ -1,7 +1,7 @@
 """Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
 
-A file with wrong contents raises `ValueError`. If one line of a ``.csv`` file is wrong, the message has its number. A
-file that cannot be read raises `OSError`.
+A file with wrong contents raises `ValueError`. If one line of a ``.csv`` file is wrong, the message has the number of
+this line. A file that cannot be read raises `OSError`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ ENDS = ("a", "b")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The numbers of a ``.csv`` file as ``rows``, and the column ``names`` in its first line; () if it has no names."""
+    """The numbers of a ``.csv`` file as ``rows``. ``names`` are the column names in its first line; () without
+    names.
+    """
 
     path: Path
     names: tuple[str, ...]

@@ -59,7 +59,7 @@ class SumFactors:
 def sum_factors(cell: Cell, name: str) -> SumFactors:
     """Return the factor that all summands of the force on the field ``name`` have in common.
 
-    It is 1 on a grid, with brackets along bonds, or if no parameter may be 0.
+    The factor is 1 on a grid, with brackets along bonds, or if no parameter may be 0.
     """
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()

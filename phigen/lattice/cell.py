@@ -100,8 +100,8 @@ class Cell:
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
-        """Return the name of the field, or of the parameter at sites, that a symbol stands for, and the offset of its
-        site.
+        """Return the field or parameter that a symbol stands for, by name, and the offset of the site at which the
+        symbol has its value.
 
         Raises `KeyError` for symbols of any other kind.
         """
@@ -194,10 +194,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Contribution:
-    """A term of ∂H/∂f at a site.
+    """A term of ∂H/∂f at a site: the derivative of a term of H.
 
-    It is the derivative of a term of H, which reads the sites between the offsets ``low`` and ``high``. Near an open
-    end, the contribution is omitted unless all these sites are on the lattice.
+    The term of H reads the sites between the offsets ``low`` and ``high``. Near an open end, the contribution is
+    omitted unless all these sites are on the lattice.
     """
 
     expression: Expression
@@ -206,8 +206,8 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """Return, for each field f, the terms of ∂H/∂f at a site of a grid: derivatives of all terms of H that read the
-    site.
+    """Return the terms of ∂H/∂f at a site of a grid, for each field f. They are derivatives of all terms of H that read
+    the site.
     """
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:

@@ -116,7 +116,9 @@ def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
 
 
 def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagnostic]:
-    """Return an error message for each size that is not a multiple of its period, at its place in the spec."""
+    """Return an error for each size that is not a multiple of the period of the colours. The error points to the size
+    in the spec.
+    """
     return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
@@ -128,7 +130,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line for the header of generated files: it names all sizes that do not fit the colours of
+    """Return one line for the header of generated files that names all sizes which do not fit the colours of
     sites.
 
     The line says that a splitting with this number of ``colours`` needs other sizes, and gives examples. If there are
@@ -140,10 +142,10 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line for the header of generated files: it names all sizes that need a boundary seam.
+    """Return one line for the header of generated files that names all sizes which need a boundary seam.
 
-    A seam is needed if a size is not a multiple of the period of the colours. For each such size, the line also names a
-    multiple near it.
+    A seam is needed if a size is not a multiple of the period of the colours. For each size, the line also names a
+    multiple near the size.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"

@@ -142,7 +142,8 @@ def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expre
 
 
 def _constant(cell: Cell, f: str, other: str, logarithmic: Sequence[str]) -> Expression | None:
-    """Return the bracket of the symbols ``f`` and ``other``, or of their logarithms; None if it is not constant.
+    """Return the bracket of the symbols ``f`` and ``other``, or of their logarithms; None if this bracket is not
+    constant.
 
     ``logarithmic`` has the fields of which logarithms are taken.
     """

@@ -50,7 +50,7 @@ class Expansion:
     # --- expressions at sites
 
     def neighbour(self, site: Site, offset: Offset) -> Site | None:
-        """Return the site at an ``offset`` from ``site``, or None if it lies beyond an open end."""
+        """Return the site at an ``offset`` from ``site``, or None if this site would lie beyond an open end."""
         position = plus(site, offset)
         is_inside = [0 <= n < size for n, size in zip(position, self.sizes, strict=True)]
         if any(b == OPEN and not i for b, i in zip(self.cell.boundary, is_inside, strict=True)):
@@ -58,7 +58,9 @@ class Expansion:
         return tuple(n % size for n, size in zip(position, self.sizes, strict=True))
 
     def at(self, expression: Expression, site: Site) -> Expression | None:
-        """Return an expression of the cell, placed at a site, or None if it reaches beyond an open end there."""
+        """Return an expression of the cell, placed at a site, or None if the expression reaches beyond an open end
+        there.
+        """
         values = {}
         for name, (base, offset) in self.cell.places(expression).items():
             source = self.neighbour(site, offset) if self.cell.axes else site
@@ -119,8 +121,8 @@ class Expansion:
         return {pair: e for pair, e in sums.items() if not e.is_zero}
 
     def casimirs(self) -> dict[str, Expression]:
-        """Return the Casimirs by name. A Casimir of the cell is a density. It stands for a sum or a product over sites,
-        or for one Casimir at each site.
+        """Return the Casimirs by name. A Casimir of the cell is a density: this density stands for a sum or a product
+        over sites, or for one Casimir at each site.
         """
         casimirs: dict[str, Expression] = {}
         plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)
@@ -280,7 +282,7 @@ def _decimal(value: float) -> Fraction:
 
 
 def _unused_name(name: str, site: Site, used_names: set[str]) -> str:
-    """Return a name such as ``x_1_2`` for ``x`` at site (1, 2), and record it in ``used_names``.
+    """Return a name such as ``x_1_2`` for ``x`` at site (1, 2), and add the name to ``used_names``.
 
     Underscores are appended while the name is used already.
     """

@@ -171,7 +171,8 @@ class _SiteEquation:
     def _bond_forces(self) -> list[BondSum]:
         """Return the sums of the forces that bonds exert on this site.
 
-        In a part of one colour, a bond contributes only if the end to which its energy is assigned has the colour.
+        The energy of a bond is assigned to one of the ends. In a part of one colour, a bond contributes only if this
+        end has the colour.
         """
         sums, selection = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
         for end in ENDS:
@@ -201,11 +202,11 @@ class _SiteEquation:
 
 
 def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expression]]:
-    """Yield the rates of change that brackets along a bond cause at its ends, if H is the sum of a ``density`` over
-    sites.
+    """Yield the rates of change that brackets along a bond cause at the ends of the bond, if H is the sum of a
+    ``density`` over sites.
 
-    Each item is a field, the end of the bond at which the field lies, and its rate. The rate is written with ``x[a]``
-    for this end and ``x[b]`` for the opposite end.
+    Each item is a field, the end of the bond at which the field lies, and the rate of the field. The rate is written
+    with ``x[a]`` for this end and ``x[b]`` for the opposite end.
     """
     slopes = dict(zip(cell.fields, gradient(density, cell.fields), strict=True))
     for (f, g), entry in cell.bond_bracket.items():

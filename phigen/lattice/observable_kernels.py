@@ -68,8 +68,8 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     """Return the density of the observable ``name`` at a site, with symbols for sums and extremes over bonds
     and pairs.
 
-    At a site where the density reaches beyond an open end, its value must not become the maximum or minimum over the
-    sites. There it is replaced by minus or plus the largest number.
+    Where the density reaches beyond an open end, the value of the density must not become the maximum or minimum over
+    the sites. There, minus or plus the largest number is used in its place.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":

@@ -45,7 +45,9 @@ JACOBI = "Jacobi identity"
 
 
 def tensor(cell: Cell) -> tuple[Statement, ...]:
-    """Return the statement that π is skew and, unless it is refuted, the statement of the Jacobi identity."""
+    """Return the statement that π is skew, and the statement of the Jacobi identity. The second is left out if the
+    first is refuted.
+    """
     if cell.relation != GRID:
         return _tensor_of_graphs(cell)
     skew = _decided(cell, "π is skew", _skewness(cell), "for all sizes")
@@ -84,7 +86,8 @@ def casimirs(cell: Cell) -> Iterator[Statement]:
 def invariants(cell: Cell) -> Iterator[Statement]:
     """Yield the statement {F, H} = 0 for each further first integral F of the spec.
 
-    F is a sum of densities over sites. {F, H} = 0 is proved by showing that its density is a telescoping sum.
+    F is a sum of densities over sites, and so is {F, H}. The statement is proved by showing that this second sum
+    telescopes.
     """
     for name, density in cell.invariants.items():
         title = f"{name} is invariant"
@@ -216,7 +219,7 @@ def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
 def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterator[Labelled]:
     """Yield the residuals for a Casimir that is a sum or a product over all sites.
 
-    They are {f, Σ C} or {f, Π C}/Π C with the density C, for each field f of a site.
+    The residuals are {f, Σ C} or {f, Π C}/Π C with the density C, for each field f of a site.
     """
     slopes = _logarithmic(cell, density) if product else euler(cell, density)
     for f, bracket_partners in _partners(cell).items():
@@ -364,8 +367,8 @@ def pair_symmetry(cell: Cell) -> Iterator[Statement]:
 def _worst(name: str, detail: str, statements: Iterator[tuple[str, Statement]]) -> Statement:
     """Return one statement for a list of (description, statement).
 
-    It is refuted if a statement of the list is refuted, and proved if all are proved. Otherwise it has the verdict of a
-    statement that is not proved.
+    If a statement in the list is refuted, the result is refuted. If all are proved, the result is proved. Otherwise the
+    result has the verdict of a statement that is not proved.
     """
     unproved: Statement | None = None
     for graph_name, s in statements:

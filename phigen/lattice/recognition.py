@@ -94,9 +94,10 @@ def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
 
 
 def _readings(coordinates: Sequence[str]) -> Iterator[dict[str, tuple[str, Site]]]:
-    """Yield maps from coordinates to (field, site), for all ways to read the numbers in the names of coordinates.
+    """Yield maps from coordinates to (field, site), for all ways to read the numbers in the names of
+    coordinates.
 
-    The site consists of all numbers in a name, or of one of them.
+    The site consists of all numbers in a name, or of one of these numbers.
     """
     groups = {len(re.findall(r"[0-9]+", c)) for c in coordinates}
     if len(groups) != 1 or groups == {0}:
@@ -340,7 +341,7 @@ def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dic
     """Return the densities and the kinds of Casimirs of the lattice, by name.
 
     A Casimir of the ordinary spec becomes a sum or a product over sites. If each site has a Casimir with the same
-    density, they become a single Casimir of the kind "sites". All other Casimirs are left out.
+    density, these Casimirs become a single one of the kind "sites". All other Casimirs are left out.
     """
     densities, kinds = dict[str, Expression](), dict[str, str]()
     by_value: dict[float, list[tuple[str, Expression]]] = {}

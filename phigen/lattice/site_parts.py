@@ -1,16 +1,16 @@
 """The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
-A part V of H is a sum over sites of terms whose coordinates commute over the whole lattice. Its gradient is constant
-along its flow. So each site has its own equation of motion ẋ = Σ_a {x, a} ∂V/∂a, where the sum is over all coordinates
-a, and values at neighbours are constants. If π couples neighbours, or if a term mixes coordinates that do not commute,
-the sites are coloured, and the terms that begin at sites of one colour form a part. Terms that are functions of a
-single site also form parts if they have an elementary flow.
+A part V of H is a sum over sites of terms whose coordinates commute over the whole lattice. The gradient of V is
+constant along the flow of V. So each site has its own equation of motion ẋ = Σ_a {x, a} ∂V/∂a, where the sum is over
+all coordinates a, and values at neighbours are constants. If π couples neighbours, or if a term mixes coordinates that
+do not commute, the sites are coloured. Then the terms that begin at sites of one colour form a part. Terms that are
+functions of a single site also form parts if they have an elementary flow.
 
 Some sizes are not multiples of the period of the colours, as for a ring with two colours and an odd number of sites.
 Then the colours are counted from site 0 on, and the last sites along an axis are the boundary *seam*. Terms that begin
-on a seam form additional parts. A seam is so wide that no term that begins elsewhere reaches across it. The position of
-a site near a seam decides which terms act on it. So each term has a weight of the kind `BEGINS` in the equation of
-motion: 1 if the term belongs to the part, else 0.
+on a seam form additional parts. A seam is so wide that no term that begins elsewhere reaches across the seam. The
+position of a site near a seam decides which terms act on the site. So each term has a weight of the kind `BEGINS` in
+the equation of motion: 1 if the term belongs to the part, else 0.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ from phigen.symbolic.tower import Tower
 #: Largest number of colours. The search tries MAX_COLOURS^axes colourings, and each colour adds flows to a step.
 MAX_COLOURS = 4
 
-#: Kind of the symbols that stand for components of the gradient of a part, which are constant along its flow.
+#: Kind of the symbols for the components of the gradient of a part. These components are constant along the flow of the
+#: part.
 FORCE = "force"
 
 Steps = tuple[int, ...]
@@ -101,8 +102,8 @@ class Colouring:
         return tuple(w for w in range(axes + 1) if w & axes == w)
 
     def on_seams(self) -> set[int]:
-        """The colours that sites on a seam may have. They are all colours, with one exception: if there is a single
-        seam and its width is 1, the last colour of a period does not occur.
+        """The colours that sites on a seam may have. These are all colours, with one exception: if there is a single
+        seam, of width 1, the last colour of a period does not occur.
         """
         seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
         if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
@@ -232,7 +233,7 @@ def splittings(
 ) -> Iterator[CellSplitting]:
     """Yield ways to write H as a sum of parts with elementary flows, one for each colouring.
 
-    They are ordered by the number of colours, then by the number of parts. Raises `SpecError` at ``place`` if there is
+    The ways are ordered by the number of colours, then by the number of parts. Raises `SpecError` at ``place`` if H is
     no such sum; the error names the term that has no flow.
     """
     search = search or PartSearch
@@ -334,7 +335,9 @@ class PartSearch:
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
-        """Return the term with each colour in turn; [] if its copies at the sites of one colour do not commute."""
+        """Return the term with each colour in turn; [] if copies of the term at the sites of one colour do not
+        commute.
+        """
         classes = [(term, c) for c in range(self.colouring.count)]
         return classes if all(self._commute(c, c) for c in classes) else []
 
@@ -436,8 +439,8 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of the sites of a colour under the terms of a part of H. If ``colour`` is None, it is the
-        motion of sites near seams.
+        """Return the motion of the sites of a ``colour`` under the terms of a part of H, or of the sites near seams if
+        ``colour`` is None.
 
         ``more`` has the terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
         """
@@ -465,7 +468,7 @@ class PartSearch:
             forces[name] = force
             rates[f].append(entry * symbol(name))
         field = {f: total(r) for f, r in rates.items() if r}
-        if colour is not None:  # no term reaches both ends of a seam, so this check covers sites near seams too
+        if colour is not None:  # sites near seams need no check: no term reaches both ends of a seam
             self._expect_still(field, colour, part)
         return self._solved_motion(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
 

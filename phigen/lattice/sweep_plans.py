@@ -77,7 +77,7 @@ class SplittingPlan:
     negative: int | None = None  # with a monitor: index of the part of H that is negative
     bodies: LatticeBodies | None = None  # the bodies, if the spec asks for relative coordinates
 
-    #: The scheme, as in specs; it is also the name of the method for users. A step is a sequence of explicit flows.
+    #: The name of the scheme in specs, and of the method for users. A step is a sequence of explicit flows.
     scheme = kind = "splitting"
     label = "splitting of a lattice"
     is_implicit, site_kind, weak_order = False, None, 2

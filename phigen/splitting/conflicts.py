@@ -1,5 +1,5 @@
-"""Grouping of the terms of H into sums of commuting terms, by colouring a graph: its edges join terms that do not
-commute.
+"""Grouping of the terms of H into sums of commuting terms, by colouring a graph. The edges of the graph join terms that
+do not commute.
 
 The algorithm is that of D. Brélaz (DSATUR, 1979). It uses two colours wherever two are sufficient, as on many lattices.
 """
@@ -16,7 +16,7 @@ from phigen.splitting.flow import Term
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: If phigen must decide for more than this number of pairs of terms whether they commute, progress is displayed.
+#: Progress is displayed if phigen must decide for more than this number of pairs of terms whether they commute.
 MIN_PAIRS_FOR_PROGRESS = 100
 
 

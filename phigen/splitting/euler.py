@@ -110,7 +110,7 @@ class Addition:
         return cls(x, factors, levels, conditions, p, r, call(AMPLITUDE, time, p, r))
 
     def sorted(self, values: Vector) -> tuple[Expression, Expression, Expression]:
-        """Return the three ``values``, one for each axis i, in the order of increasing E_i."""
+        """Return the ``values`` of the three axes i in the order of increasing E_i."""
         return sorted_by(self.conditions, values)
 
     def changes(self) -> list[Expression]:
@@ -135,11 +135,11 @@ class Addition:
         return _ends(self.x, self.factors, sigma, s, divisor, gaps)
 
     def _at_lowest(self, chosen: Vector, others: Vector) -> list[Expression]:
-        """Return three values: that of ``chosen`` for the axis with the lowest E_i, those of ``others`` for the other
-        two axes.
+        """Return one value for each axis: from ``chosen`` for the axis with the lowest E_i, from ``others`` for the
+        other two axes.
 
-        The axis is selected by the same conditions everywhere, because on the separatrix two E_i are equal but have
-        different derivatives.
+        The axis is selected by the same conditions everywhere. This is necessary because on the separatrix two E_i are
+        equal but have different derivatives.
         """
         second, third, _ = self.conditions
         first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
@@ -169,7 +169,7 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
 
 
 def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return the three ``values``, one for each axis i, in the order of increasing E_i.
+    """Return the ``values`` of the three axes i in the order of increasing E_i.
 
     ``conditions`` are the results of `_order`.
     """

@@ -142,8 +142,8 @@ def _without_quotients(
 ) -> Solution | None:
     """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −cA^a, without dividing by c.
 
-    They are computed by entire functions of s = ct². Returns None if there is no such form. sin and 1 − cos of the
-    angle √s are computed from functions of half the angle.
+    The increments are computed by entire functions of s = ct². sin and 1 − cos of the angle √s are computed from
+    functions of half the angle. Returns None if there is no such form.
     """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
@@ -201,8 +201,8 @@ def _hyperbolic(
 ) -> Solution:
     """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = e²A^a, for a = 1 or 2.
 
-    The formulas are those of `_circular` with sinh and cosh in place of sin and cos; cosh θ − 1 is written as 2
-    sinh²(θ/2). The arguments are those of `_circular` too.
+    The arguments and the formulas are those of `_circular`, with sinh and cosh in place of sin and cos. In the
+    formulas, cosh θ − 1 is written as 2 sinh²(θ/2).
     """
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:

@@ -1,8 +1,8 @@
 """The exact flow of a part of H, as increments of the coordinates.
 
-A part is a sum of terms that commute with one another. If its equations of motion can be solved as a whole, their
-solution is the flow. Otherwise the flow is the composition of the flows of the terms; their order does not matter,
-since the terms commute.
+A part is a sum of terms that commute with one another. If the equations of motion of the part can be solved as a whole,
+the solution is the flow. Otherwise the flow is the composition of the flows of the terms. The order of the terms does
+not matter, since they commute.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Flow:
-    """The flow of ``hamiltonian`` over the time `TIME`: it maps x to x + ``increment``; ``manner`` describes it in
-    words.
+    """The flow of ``hamiltonian`` over the time `TIME`, which maps x to x + ``increment``; ``manner`` describes the
+    flow in words.
 
-    If it is the flow of a ``force``, which is a vector field, the Hamiltonian is 0. If the flow is composed of several
-    commuting flows, these are its ``pieces``. ``motion`` is set for Kepler motions and rigid bodies. ``exponentials``
-    are the matrix exponentials whose entries occur as symbols in the increments.
+    For the flow of a ``force``, which is a vector field, the Hamiltonian is 0. If the flow is composed of several
+    commuting flows, these are listed in ``pieces``. ``motion`` is set for Kepler motions and rigid bodies.
+    ``exponentials`` are the matrix exponentials whose entries occur as symbols in the increments.
     """
 
     hamiltonian: Expression
@@ -81,7 +81,7 @@ class Flow:
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
-        """Return the vector field of which this is the flow: the force, or π∇H for the Hamiltonian H of the part."""
+        """Return the vector field whose flow this is: the force, or π∇H for the Hamiltonian H of the part."""
         return self.force or hamiltonian_vector_field(system.poisson, gradient(self.hamiltonian, system.coordinates))
 
     @property

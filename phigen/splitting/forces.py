@@ -176,7 +176,8 @@ def _components(vector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
 def _summand_flows(
     system: System, field: Field, summands: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
 ) -> Iterator[Flow]:
-    """Yield the flow of a field or, if it has none in closed form, the flows of its summands.
+    """Yield the flow of a field or, if phigen knows no closed form of this flow, the flows of the ``summands`` of the
+    field.
 
     Raises `SpecError` if a summand has no flow; ``keys`` are the keys of the spec at which the error is located.
     """

@@ -126,8 +126,9 @@ class _Orbit:
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 
     def end(self, c: Expression, s: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return G1, G2 and the distance r = |q'| after the flow, from C and S; these are defined by the formulas of
-        this module."""
+        """Return G1, G2 and the distance r = |q'| after the flow, from C and S. All five are defined by the formulas of
+        this module.
+        """
         g1, g2 = 2 * s * c, 2 * s**2
         return g1, g2, self.distance + (self.moment * g1 + (self.mu - self.beta * self.distance) * g2)
 

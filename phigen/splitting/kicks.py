@@ -107,8 +107,10 @@ def _graded(ring: Ring, v: Poly, t: Poly) -> bool:
 
 
 def degree(ring: Ring, element: Poly, coordinates: Sequence[int]) -> float:
-    """Return the degree of an element of the ring in some coordinates, given by index; infinity if it is no polynomial
-    in them."""
+    """Return the degree of an element of the ring in some coordinates, given by index.
+
+    The degree is infinity if the element is no polynomial in these coordinates.
+    """
     names = [ring.coordinates[i] for i in coordinates]
     highest = 0.0
     for exponents in element.to_dict():

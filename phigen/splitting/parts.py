@@ -84,8 +84,9 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
-    """Return the invariants of the spec as elements of the ring; those with functions or symbols that H and π lack are
-    omitted."""
+    """Return the invariants of the spec as elements of the ring. Invariants with functions or symbols that H and π lack
+    are omitted.
+    """
     elements = []
     for e in system.invariants.values():
         try:
@@ -109,8 +110,8 @@ def _candidates(
 ) -> Iterator[list[Term]]:
     """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
-    The lists are, in this order: the terms as written; with squares of sums undivided; with motions as single terms;
-    summed by blocks of π; with companions subtracted; and with groups of terms summed.
+    The lists differ in their terms, in this order: terms as written; squares of sums as single terms; motions as single
+    terms; sums by blocks of π; terms after subtraction of companions; and sums of groups of terms.
     """
     yield terms
     ring = conflicts.ring

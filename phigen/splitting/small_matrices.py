@@ -72,9 +72,8 @@ def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
 
 
 def _relation(ring: Ring, a: Matrix) -> Iterator[Poly]:
-    """Yield the coefficients c_0 … c_{n−1} in the relation Aⁿ = Σ c_j A^j of an n×n matrix A.
-
-    They are computed by the method of Faddeev and Leverrier.
+    """Yield the coefficients c_0 … c_{n−1} in the relation Aⁿ = Σ c_j A^j of an n×n matrix A, by the method of Faddeev
+    and Leverrier.
     """
     n = range(len(a))
     zero, traces = ring.tower.zero, list[Poly]()

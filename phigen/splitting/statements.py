@@ -194,10 +194,10 @@ def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tu
 
 
 def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression; all expressions vanish if a flow Φ_t is the exact flow of its vector
+    """Yield pairs of a label and an expression; all expressions vanish if Φ_t is the exact flow of its vector
     field X.
 
-    They are the components of Φ_0 − 1 and of dΦ_t/dt − X∘Φ_t.
+    The expressions are the components of Φ_0 − 1 and of dΦ_t/dt − X∘Φ_t.
     """
     names = system.coordinates
     slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes().items()}
