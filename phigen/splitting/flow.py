@@ -27,7 +27,7 @@ from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
-#: Motions whose flows have formulas of their own, which are proved by identities in independent symbols.
+#: Motions with special formulas for their flows. The formulas are proved by identities in independent symbols.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
 #: Methods for linear equations ẇ = Aw, in the order in which they are tried. A function with such a method as its

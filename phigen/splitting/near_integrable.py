@@ -34,8 +34,8 @@ def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term
     """Return the terms of H with each Kepler motion as a single term, first in the list. Returns None if there are no
     motions.
 
-    If ``rigid``, free rigid bodies are single terms too. Only terms of one body belong to its motion: (p_1 + p_2)² is
-    not divided, so that it still commutes with functions of q_1 − q_2.
+    If ``rigid``, free rigid bodies are single terms too. A motion contains only terms of one body. So (p_1 + p_2)² is
+    not divided, and still commutes with functions of q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:

@@ -134,7 +134,7 @@ def _candidates(
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
-    """Return the terms of H. A summand that has a flow as a whole is one term, and is not expanded into
+    """Return the terms of H. If a summand has a flow as a whole, the summand is one term, and is not expanded into
     monomials.
 
     An example on so(3) is (v·m)²: it rotates m about v, while its monomials do not commute with each other. Returns

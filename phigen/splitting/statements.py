@@ -182,7 +182,7 @@ def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tu
     """Yield pairs of a label and an expression for the flow of Kepler motions or of a rigid body.
 
     All expressions vanish under three conditions. π∇H is the vector field of the motion. The increments are given by
-    the known formula for this motion. The identities hold by which the formula is proved.
+    the known formula for this motion. The identities that prove the formula hold.
     """
     names = system.coordinates
     field = flow.vector_field(system)
