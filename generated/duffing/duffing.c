@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 646d1c0d1c9c0939c622666c80c3bbf1fdc4a85c3cb1338d66d5c1b5c01cd9dc
+ * body-sha256: a278a56546f5d2b58661a0cfb1f9d549ebd3235cb75f4e56a6968168dbd20f76
  */
 #include "duffing.h"
 #include <float.h>
@@ -19,9 +19,10 @@
 /* ---- The model ---- */
 const duffing_params duffing_default_params = { 0.1, 1.2 };
 
-enum { duffing_PREPARED = 22 };       /* first coefficients, which depend on params and h only */
+enum { duffing_PREPARED = 22 }; /* number of coefficients that depend on params and h only; they come first */
 enum { duffing_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define duffing_TOLERANCE 1e-20       /* largest expected next correction of y, relative to y */
+/* iterations end if the next correction is expected to be below this, relative to y */
+#define duffing_TOLERANCE 1e-20
 
 /* Midpoint of the step, at which time-dependent coefficients are evaluated. */
 #define duffing_middles 0.5
@@ -82,25 +83,21 @@ static void duffing_prepare(const duffing_params *params, double h, double coef[
     coef[21] = t9 * t2 * (1.0 / 12.0 + t1 * (-1.0 / 120.0 - t10));
 }
 
-/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y). */
+/* At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha,
+   the Jacobian of alpha, and the Jacobian of the increment. */
 static void duffing_linearise(const double coef[33], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double q = y[0], p = y[1];
-    /* momenta */
     const double t1 = q * q, t2 = p * p, t3 = coef[4] * t1, t4 = q * (coef[29] + q * (coef[0] + t3));
     const double p_p = coef[28] + coef[30] * t1 + p * (coef[5] + coef[6] * t2 + t4);
     const double t5 = coef[24] + p * (coef[25] + coef[0] * p);
     const double p_q = coef[22] + coef[23] * t2 + q * (t5 + q * (coef[26] + q * (coef[1] + coef[2] * t2
         + q * (coef[27] + q * (coef[3] + t3)))));
-    /* displacement */
     displacement[0] = (-0.5) * p_p;
     displacement[1] = 0.5 * p_q;
-    /* increment */
     increment[0] = p_p;
     increment[1] = -p_q;
-    /* jacobian */
     const double t6 = coef[29] * p + q * (coef[25] + p * (coef[11] + coef[12] * t1)), t7 = 0.5 * t6;
     const double t8 = coef[5] + coef[13] * t2 + t4;
     const double t9 =
@@ -109,7 +106,6 @@ static void duffing_linearise(const double coef[33], const double y[2], double d
     jacobian[1] = (-0.5) * t8;
     jacobian[2] = 0.5 * t9;
     jacobian[3] = 1.0 + t7;
-    /* increment jacobian */
     increment_jacobian[0] = t6;
     increment_jacobian[1] = t8;
     increment_jacobian[2] = -t9;
@@ -163,7 +159,7 @@ static int duffing_advance(duffing_solver *s, const double *change, const double
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[duffing_DIM])
 {
     for (int k = 0; k < duffing_DIM; ++k) {
@@ -264,7 +260,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define duffing_SHRINKING 0.25
 
-/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
+/* Largest relative component of the correction delta of y; NaN or infinite if a component is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -279,7 +275,7 @@ static double duffing_size(const double y[duffing_DIM], const double delta[duffi
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
    effect of the last correction on the increment is added to first order, without another evaluation. So
-   iterations end if the next correction, quadratic in the last, is expected below duffing_TOLERANCE. */
+   iterations end if the next correction is expected to be below duffing_TOLERANCE. */
 static duffing_status duffing_attempt(duffing_solver *s)
 {
     double y[duffing_DIM], delta[duffing_DIM], displacement[duffing_DIM], increment[duffing_DIM];

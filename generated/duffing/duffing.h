@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f246ea189a82e5b0ee555e5cd74de75c0c33af3a2c069eaa657086ef77152a61
+ * body-sha256: 1c88b55f0c67d8c3b15fcecf50bedf54b5cc2fa60f6fffe2a70e616f707493e2
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -14,7 +14,7 @@ extern "C" {
 #define duffing_CASIMIRS 0 /* Casimirs: none */
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
-enum { duffing_COEFFICIENTS = 33 }; /* numbers that are functions of params and h, and of the time */
+enum { duffing_COEFFICIENTS = 33 }; /* number of coefficients: functions of params and h, and of the time */
 enum { duffing_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {

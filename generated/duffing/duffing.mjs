@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ee8fe010c6a73588efe78d3765f86448bfa7be4a50119cbc8fc2283fcc87c77c
+ * body-sha256: ddcd3f927e1b5ba5ffcd3819bd3d53db3f3e439645dc3804ff4607ac58c38438
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -120,8 +120,8 @@ function refresh(coef, t, now) {
 }
 
 /**
- * At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
- * increment, all with the momenta p = grad S_h(y).
+ * At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha,
+ * the Jacobian of alpha, and the Jacobian of the increment.
  */
 function linearise(coef, y, displacement, increment, jacobian, incrementJacobian) {
   const q = y[0];
@@ -165,7 +165,7 @@ function energy(params, t, x, energy) {
 function casimirs(params, x, out) {
 }
 
-/** Pi(x) grad H(t, x). */
+/** The right-hand side pi(x) grad H(t, x). */
 function vectorField(params, t, x, out) {
   const q = x[0];
   const p = x[1];
@@ -191,7 +191,7 @@ const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors. */
+/** Number of stored differences; differences of higher order would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----
@@ -208,7 +208,7 @@ const STATUS = {
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps number of successful steps before
+   * @param {number} steps number of successful steps before the failure
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -227,7 +227,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
+/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -255,8 +255,8 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params t0".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and the coefficients of a very small step are finite.
+ * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
+ * where required, and unless the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -303,7 +303,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -568,10 +568,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance;
- * returns a status. The effect of the last correction on the increment is added to first order, without
- * another evaluation. So iterations end when the next correction, of the order of the square of the last
- * one, is expected to be below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
+ * the square of the last one.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -654,7 +654,7 @@ class History {
   }
 
   /**
-   * Add the change of the state, to - from, to the last solution; differences are unchanged.
+   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to

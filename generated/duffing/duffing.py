@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 59a09fdeb093b5a45722e6f19f23ece5364b1573d618d02d4d3fbed813713060
+# body-sha256: 3dc1c248523edbff2073375f2dee13972aed98aa5afe99ba4b9aabae0f6f2a2d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -105,7 +105,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -179,8 +180,8 @@ def _refresh(coef, t):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
-    the increment, all with the momenta p = grad S_h(y)."""
+    """At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta
+    - alpha, the Jacobian of alpha, and the Jacobian of the increment."""
     q = y[..., 0]
     p = y[..., 1]
     t1 = q * q
@@ -257,7 +258,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
 
     The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction, of the order of the square of the last one, is expected to be below 1e-20. Returns the new x,
+    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
     its compensation term, y, and a status for each member, "" if it was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -318,7 +319,7 @@ def _coefficients(parameters, x, h, gauge):
     MIDDLES.
 
     The coefficients are those that do not depend on the time. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     return [
@@ -330,7 +331,7 @@ def _coefficients(parameters, x, h, gauge):
 def _renewed(stage, t, h):
     """Return the data of a stage in the step of size h that begins at the time t.
 
-    They are all coefficients, the parameters, the size of the stage, and the time of its midpoint. `stage` is what
+    The data are all coefficients, the parameters, the size of the stage, and the time of its midpoint. `stage` is what
     _coefficients returns for the stage.
     """
     coef, parameters, step, middle = stage
@@ -353,7 +354,7 @@ def step(x, h, t0=0.0, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -428,7 +429,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, t, x):
-    """Pi(x) grad H(t, x)."""
+    """The right-hand side pi(x) grad H(t, x)."""
     A = parameters["A"]
     omega = parameters["omega"]
     q = x[..., 0]

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 227f855ade61a0b0718c38cda3c4921beb1b92fe1de8347ced9185615af7e437
+ * body-sha256: 9b5beb4c1c73ef5be5be9df43a7430fb7ca2f1b730dab98131ed9337528c1006
  */
 #include "food_web.h"
 #include <limits.h>
@@ -31,7 +31,7 @@ enum { food_web_FLOWS = 25 };         /* flows in a step */
 /* Along each axis: the smallest number of sites. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 
-/* For each part of H, 1 if it consists of one flow for each colour of sites. */
+/* For each part of H, 1 if its flow is made of one flow for each colour of sites, else 0. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
 /* Return the part of H, counted from 1, of a flow; *flow becomes the colour of the sites that it updates. */
@@ -42,7 +42,8 @@ static int food_web_part_of_flow(const food_web_solver *s, int *flow)
     return part;
 }
 
-/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
+/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
+   flows. */
 static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -50,7 +51,8 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* Flows of each row, if a step has one flow for each colour: 0 first, 1 inner, 2 last, 3 inner in reverse. */
+/* A stage has one flow for each colour of sites. For each row of coefficients, the flows that use it: 0 the
+   first, 1 all inner ones, 2 the last, 3 all inner ones in reverse order. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
@@ -64,7 +66,7 @@ static int food_web_allowed(const food_web_params *params, size_t sites, size_t 
     return 1;
 }
 
-/* All values that depend only on parameters and on the duration of a flow. */
+/* Compute the coefficients that depend on parameters and on the duration of a flow. */
 static void food_web_prepare(const food_web_params *params, double h, double coef[restrict 1])
 {
     (void)params;
@@ -72,10 +74,10 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 }
 
 /* ---- Rows of sites ---- */
-/* Segment of a row, with the pointers and numbers that loops over its sites read. */
+/* A segment of a row, with the pointers and numbers that a loop over the sites of the segment reads. */
 typedef struct {
     const food_web_solver *s;
-    double *const *x;   /* see food_web_solver */
+    double *const *x;   /* fields and parameters, as in food_web_solver */
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
     int chosen;         /* the colour of the sites that a sweep updates */
 } food_web_row;
@@ -100,7 +102,7 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
     return 1;
 }
 
-/* The record of the whole row. */
+/* The whole row as one segment. */
 static inline food_web_row food_web_row_of(const food_web_solver *s)
 {
     food_web_row row;
@@ -114,7 +116,8 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
 
 enum { food_web_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
+/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
+   segment. */
 static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
@@ -136,7 +139,7 @@ static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* those of shifted; the last of them are k */
+    uint64_t bits; /* the bits of shifted; the last ones are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -195,7 +198,7 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row)
     }
 }
 
-/* A flow. */
+/* A flow of the step, chosen by its number. */
 static void food_web_sweep_colour(const food_web_solver *s, int flow, const double *coef)
 {
     food_web_part_of_flow(s, &flow);
@@ -476,7 +479,7 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* Make steps from the state in s->before, which s->x has too. The last flow of the last step is not made.
+/* Make steps from the state in s->before, which is also in s->x. The last flow of the last step is not made.
    Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static food_web_status food_web_march(food_web_solver *s, size_t steps)
 {

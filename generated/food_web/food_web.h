@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 02bf014a453d75c1d592471d440559a3906230496e0d1ccde4131751f60fe7e7
+ * body-sha256: 4d254ea7969bf4193ea09255a57072949ba34a46879dc0be789cb25c31a5bbc5
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -24,7 +24,7 @@ typedef struct {
 extern const food_web_params food_web_default_params;
 
 enum { food_web_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
-enum { food_web_COEFFICIENTS = 26 }; /* numbers that are functions of params and h */
+enum { food_web_COEFFICIENTS = 26 }; /* number of coefficients: functions of params and h */
 enum { food_web_GATHERED = 1 };      /* sums over bonds or pairs, stored for each site */
 enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 
@@ -74,8 +74,8 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
    call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
@@ -84,8 +84,8 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 void food_web_state(const food_web_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range, and
-   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
-   compensated steps. To restore, call food_web_init, then food_web_resume with these values. */
+   arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
+   compensated steps. To restore the run, call food_web_init, then food_web_resume with these values. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,
     size_t full_range);

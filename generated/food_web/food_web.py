@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b8576b8bcab33824486ed6556cc181592a2f02e42208e63f13f72c058cda4cef
+# body-sha256: 5bc46f147a23cc47ebab0d025da20110a1930b594717e47a135dbc4a9e4af246
 import numpy as np
 
 VERSION = "0.1.0"
@@ -31,8 +31,9 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
-# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
+# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
+# H, row).
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
@@ -41,7 +42,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
     """
 
     def __init__(self, step, status, states):
@@ -92,8 +93,7 @@ class _Sites:
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
-        arbitrary."""
+        """Return, for each site, the value of its neighbour at an offset. Beyond open ends, the value is arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -159,9 +159,9 @@ class _Graph(_Sites):
         return np.bincount(here, np.broadcast_to(values, here.shape), self.sizes[0])
 
 
-# For each part of H, whether it consists of one flow for each colour of sites. An entry of SCHEDULE here begins not with
-# a part of H, but with 0 for the first flow of all parts and colours, 1 for all inner flows, 2 for the last flow, or 3
-# for all inner flows in reverse order.
+# For each part of H, whether its flow is made of one flow for each colour of sites. An entry of SCHEDULE here begins
+# not with a part of H, but with 0 for the first flow of all parts and colours, 1 for all inner flows, 2 for the last
+# flow, or 3 for all inner flows in reverse order.
 BY_COLOUR = (True,)
 
 
@@ -263,7 +263,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """All values that depend only on parameters and on the duration of a flow."""
+    """Compute the coefficients that depend on parameters and on the duration of a flow."""
     return [h]
 
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 1f39002e826d187d47a9c66a65956fa2067b987f2f7083a6974861225b7874f2
+ * body-sha256: 30c07d2b3db61a606e21475cee4ddaeb10855adcacb0b971df3853116fa57066
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -23,8 +23,9 @@ const guiding_centre_params guiding_centre_default_params = { 0.5, 0.3, 0.2 };
 enum { guiding_centre_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 /* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { guiding_centre_TERMS = 30 };
-enum { guiding_centre_SERIES = 55 }; /* Taylor series of a path, those of the coordinates first */
-enum { guiding_centre_FIXED = 1 };   /* values that are constant along a path */
+/* number of Taylor series of a path; those of the coordinates come first */
+enum { guiding_centre_SERIES = 55 };
+enum { guiding_centre_FIXED = 1 }; /* number of values that are constant along a path */
 
 /* A step of size h is composed of steps of these fractions of h. */
 static const double guiding_centre_fractions[guiding_centre_STAGES] = { 0.4144907717943757,
@@ -53,13 +54,11 @@ static void guiding_centre_generate(const double coef[5], const double y[4], dou
     double jacobian[16])
 {
     const double x = y[0], y_ = y[1], z = y[2], u = y[3];
-    /* slope */
     const double t1 = 1.0 + coef[3] * (x * x + y_ * y_), t2 = sqrt(t1), t3 = 1.0 / t2;
     slope[0] = coef[0] * (x * t3);
     slope[1] = coef[0] * (y_ * t3);
     slope[2] = coef[1] * z;
     slope[3] = coef[2] * u;
-    /* jacobian */
     const double t4 = t3 * (t3 * t3), t5 = coef[3] * y_ * t4, t6 = coef[0] * (x * t5), t7 = coef[4] * u;
     const double t8 = t2 + 2.0 * (t7 / t1), t9 = 1.0 / (t2 * t8), t10 = 0.5 * (t6 * t9);
     const double t11 = coef[0] * (t3 - x * (coef[3] * x * t4)), t12 = coef[4] * x, t13 = t12 * t9;
@@ -142,7 +141,7 @@ static int guiding_centre_advance(guiding_centre_solver *s, const double *change
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centre_DIM],
     double side[guiding_centre_DIM])
 {
@@ -447,7 +446,7 @@ enum {
     /* largest number of pieces of all paths in a stage; steps that need more have errors of the size of the
        state */
     guiding_centre_MOST_PIECES = 512,
-    /* iterations before it is checked whether the approximate Jacobian is good enough */
+    /* after so many iterations, it is checked whether the approximate Jacobian is good enough */
     guiding_centre_PATIENCE = 3,
 };
 /* terms of a series below this, relative to the path, are rounding */

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2f73bd6746907fdf4aa3a28f48f1e5027c0d206de79d85cfa1194130263b83a0
+ * body-sha256: 72e21122cb469f6163deb810d959b39405b6e4ea8ace5a9cba6cc1cd6f7c7d43
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -15,7 +15,7 @@ extern "C" {
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 enum { guiding_centre_STAGES = 5 };       /* stages of a step */
-enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
+enum { guiding_centre_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
 enum { guiding_centre_DIFFERENCES = 9 };  /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {

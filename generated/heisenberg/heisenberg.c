@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: acf9c5b55ffc4f742730d0415f2a2e73b330e6cee9f487e227fa67466a9627f0
+ * body-sha256: a3cb6ea707cf1354a1975809c3907e45d9fa316a5bd88b49e908be7babc96f13
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -40,14 +40,15 @@ static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 
-/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
+/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
+   flows. */
 static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
 /* For each row of coefficients, the part of H whose flow uses it. */
 static const unsigned char heisenberg_flow_parts[heisenberg_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 1 };
 
-/* For each part of H: numbers of planes read before and after the updated one, fields read there, fields
-   changed. */
+/* For each part of H: how many planes a flow reads before and after the updated plane, the fields read on
+   these planes, and the fields changed. */
 static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1, 2, 5 }, { 1, 1, 4, 3 } };
 
 /* Whether all parameters are finite and within their bounds. */
@@ -58,7 +59,7 @@ static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
     return isfinite(params->J);
 }
 
-/* All values that depend only on parameters and on the duration of a flow. */
+/* Compute the coefficients that depend on parameters and on the duration of a flow. */
 static void heisenberg_prepare(const heisenberg_params *params, double h, double coef[restrict 3])
 {
     coef[0] = -(params->J * h);
@@ -67,10 +68,10 @@ static void heisenberg_prepare(const heisenberg_params *params, double h, double
 }
 
 /* ---- Rows of sites ---- */
-/* Segment of a row, with the pointers and numbers that loops over its sites read. */
+/* A segment of a row, with the pointers and numbers that a loop over the sites of the segment reads. */
 typedef struct {
     const heisenberg_solver *s;
-    double *const *x;    /* see heisenberg_solver */
+    double *const *x;    /* fields and parameters, as in heisenberg_solver */
     const ptrdiff_t *at; /* offsets of the row and of its neighbouring rows from the first row, in doubles */
     ptrdiff_t from, to;  /* first site of the segment, and the one after the last */
 } heisenberg_row;
@@ -732,7 +733,7 @@ static void heisenberg_apply_flow(const heisenberg_solver *s, size_t steps, int 
    thread has its own range of slices. At the ends of the range, flow k first leaves out k heisenberg_SPAN
    slices, which are updated when all threads have reached their ends. Each flow reads the same values as in
    separate passes, so the bits are the same. */
-/* largest number of flows in a block; bytes of cache for their slices */
+/* largest number of flows in a block; bytes of cache for the slices of all these flows */
 enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 };
 
 /* Number of slices: all rows with one index of the first axis form a slice. */
@@ -828,7 +829,7 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-/* Make steps from the state in s->before, which s->x has too. The last flow of the last step is not made.
+/* Make steps from the state in s->before, which is also in s->x. The last flow of the last step is not made.
    Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
 {
@@ -979,8 +980,8 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out)
 }
 
 /* ---- Caller-driven stepping ---- */
-/* Number of stages that callers can make: those of a step and, without noise, the last one merged with the
-   first. */
+/* Number of stages that callers can make: the stages of a step and, without noise, its last stage merged with
+   the first one. */
 enum { heisenberg_NUMBERED = heisenberg_FLOWS + 1 };
 
 size_t heisenberg_stages(void) { return heisenberg_FLOWS; }

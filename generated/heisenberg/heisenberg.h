@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1e11c8488e426f47402f73c778e75848a48e4315e39acdc594020214d3213bb7
+ * body-sha256: dafe7e6f6d4a6d96e1c57d112241cf0ebc849d141eb2150092bd37bb2a381931
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -24,7 +24,7 @@ typedef struct {
 extern const heisenberg_params heisenberg_default_params;
 
 enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
-enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that are functions of params and h */
+enum { heisenberg_COEFFICIENTS = 18 }; /* number of coefficients: functions of params and h */
 
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
@@ -61,8 +61,8 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
    call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
@@ -81,8 +81,8 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range,
-   and arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that
-   with compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
+   and arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
+   compensated steps. To restore the run, call heisenberg_init, then heisenberg_resume with these values. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t full_range);
@@ -103,7 +103,8 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 typedef struct {
     /* number of planes that are read before the first updated one, and after the last */
     size_t behind, ahead;
-    unsigned long read, changed; /* fields read there, and fields that are updated: bit k is 1 for field k */
+    /* fields read on these planes, and fields that are updated: bit k is 1 for field k */
+    unsigned long read, changed;
 } heisenberg_stage;
 
 size_t heisenberg_stages(void);

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1fc741ed1c70a66d12fc7a3345895e14c086492958acc8d5254cd17c7f2081b2
+# body-sha256: 30f9f4b5e330e7a231504cd8728828eb1a9d6043760b594097618da0c18df376
 import numpy as np
 
 VERSION = "0.1.0"
@@ -31,8 +31,9 @@ OPEN = (False, False, False,)
 LEAST = (2, 2, 2,)
 PERIODS = (1, 1, 1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
-# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
+# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
+# H, row).
 TIMES = (0.5, 0.5, 1.0, 0.5, 0.5,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
@@ -41,7 +42,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
     """
 
     def __init__(self, step, status, states):
@@ -92,8 +93,7 @@ class _Sites:
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
-        arbitrary."""
+        """Return, for each site, the value of its neighbour at an offset. Beyond open ends, the value is arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -191,7 +191,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """All values that depend only on parameters and on the duration of a flow."""
+    """Compute the coefficients that depend on parameters and on the duration of a flow."""
     J = parameters["J"]
     return [-(J * h), J, -h]
 

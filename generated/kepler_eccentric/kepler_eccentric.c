@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 6a7c4b82ce2c091a3af53aaa89a3baa30e106fbde40d410b5b9df843b3eb6b07
+ * body-sha256: 8f20db378754c701e45a44b896f1e27c1b113860d44ae2fcd519f070f926225d
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -23,7 +23,7 @@ const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* rows of coefficients, one for each duration of a flow */
 enum { kepler_eccentric_ROW = 4 };            /* coefficients in a row */
 
-/* Times of the flows of a step, as fractions of h: one for each row of coefficients. */
+/* Durations of the flows of a step, as fractions of h: one for each row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,
     0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727,
     -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757,
@@ -113,8 +113,8 @@ static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
-/* Add change to coordinate i within a step: displacement is the sum of the changes so far and the
-   compensation term, and x is start + displacement, rounded. */
+/* Add change to coordinate i within a step. displacement is the sum of the compensation term and of the
+   changes so far; x is the rounded sum start + displacement. */
 static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
     double displacement[kepler_eccentric_DIM], const double start[kepler_eccentric_DIM], int i, double change)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e73453d8817726fd70193d8318820d8e23a6554f68ce1a5ffe5e8b3d30b5ab3b
+ * body-sha256: 698b1de666ecb51edd4a5ba24a032da08b3ce1516cc80dc79fcedb16d6250b8a
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -14,7 +14,7 @@ extern "C" {
 #define kepler_eccentric_CASIMIRS 0 /* Casimirs: none */
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
 #define kepler_eccentric_SPEC_SHA256 "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
-enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that are functions of params and h */
+enum { kepler_eccentric_COEFFICIENTS = 140 }; /* number of coefficients: functions of params and h */
 enum { kepler_eccentric_GAUGES = 1 };         /* the energy level e */
 
 typedef struct {

@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d44c99fb2f7e1a64ca7a2d237ba8483ccf0db6365d80cf96c40d427f81c37a58
+# body-sha256: 0529ce0470a44d6111255d6a966b3cd723e98f05a3cbddaf24878eff1e5964d3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -106,7 +106,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -156,8 +157,8 @@ def _flow2(coef, state):
         ])
 
 
-# TIMES has the time of the flow of each row of coefficients, as a fraction of h. ROW is the number of coefficients in a
-# row. SCHEDULE lists the flows of a step in order, each as (part of H, row).
+# Coefficients are in rows of ROW numbers. TIMES has, for each row, the duration of its flow as a fraction of h.
+# SCHEDULE lists the flows of a step in order, each as (part of H, row).
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
 ROW = 4
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12), (1, 13), (0, 14), (1, 15), (0, 16), (1, 17), (0, 18), (1, 19), (0, 20), (1, 21), (0, 22), (1, 23), (0, 24), (1, 25), (0, 26), (1, 27), (0, 28), (1, 29), (0, 30), (1, 31), (0, 32), (1, 33), (0, 34))
@@ -180,7 +181,7 @@ def _advance(stage, x, carry, memory):
 
 
 def _prepare(parameters, gauge, h):
-    """Return the coefficients of the flows of a step of size h, one row after the other, one row for each of TIMES."""
+    """Return the coefficients of the flows of a step of size h: a row for each entry of TIMES, in one list."""
     return [c for time in TIMES for c in _prepare_row(parameters, gauge, time * h)]
 
 
@@ -210,7 +211,7 @@ def _refused(parameters, x):
 def _time_of(stage, x, value):
     """Return the physical time (members,) that passes in a stage with start x and solution value.
 
-    It is NaN unless it has the sign of the step.
+    The time is NaN unless it has the sign of the step.
     """
     elapsed = value
     return np.where(elapsed * np.sign(stage[2]) > 0, elapsed, np.nan)
@@ -220,7 +221,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -243,7 +244,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -330,7 +331,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     oblateness = parameters["oblateness"]
     q1 = x[..., 0]
     q2 = x[..., 1]

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 3f5b0e2d1cb91b69e5c8b559f49504b24f2f62a1ff53bdf60a786b9146aba309
+ * body-sha256: 139ebf295b3a53a02fda13e90e29b088a25fdfa136dd3247191cc68d6347d4ba
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -24,7 +24,7 @@
 /* ---- The model ---- */
 const kowalevski_gauss_params kowalevski_gauss_default_params = { 0 };
 
-enum { kowalevski_gauss_PLAIN = 4 }; /* the first unknowns, whose changes are relative to |x| */
+enum { kowalevski_gauss_PLAIN = 4 }; /* unknowns whose changes are relative to |x|; these come first */
 /* numbers that define the start of a step: coordinates, and the time if H depends on it */
 enum { kowalevski_gauss_POINT = 6 };
 enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* largest number of sweeps over the stages of a step */
@@ -137,8 +137,8 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #define kowalevski_gauss_EACH_LANE
 #endif
 
-/* Gauss collocation: the nodes c_j, the weights b_j, and the matrix mu = A diag(1/b); row j has the factors
-   of stage j. mu_ij + mu_ji is exactly 1 in floating point, which makes the method symplectic. */
+/* Gauss collocation: nodes c_j, weights b_j, and mu = A diag(1/b) with the Runge-Kutta matrix A. Row j has
+   the factors of stage j. mu_ij + mu_ji is exactly 1 in floating point, which makes the method symplectic. */
 static const double kowalevski_gauss_nodes[kowalevski_gauss_NODES] = { 0.019855071751231884,
     0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645,
     0.8983332387068134, 0.9801449282487681 };
@@ -165,8 +165,8 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 };
 
 enum { kowalevski_gauss_PREDICTORS = 3 };
-/* Weights of the predictors of the stages of a step: of the stage increments of the last step, then of those
-   of the step before it. The last predictor uses the last step only. */
+/* Predictors of the stages of a step: sums of the stage increments of the last step and of the step before,
+   with these weights. The last predictor uses the last step only. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
@@ -264,8 +264,8 @@ static inline double kowalevski_gauss_total(const double values[kowalevski_gauss
         + (values[3] + values[7])));
 }
 
-/* For each stage, a sum of the increments of one unknown at all stages, with weights from a column of the
-   matrix. */
+/* Compute a value for each stage: the sum of the increments of one unknown at all stages, with weights from a
+   column of the matrix. */
 static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     const double increment[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
@@ -285,8 +285,8 @@ static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_N
     }
 }
 
-/* For each stage, a weighted sum of the increments of one unknown at all stages of a step and of the step
-   before. */
+/* Compute a value for each stage: a weighted sum of the increments of one unknown, at all stages of a step
+   and of the step before. */
 static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], const double increment[kowalevski_gauss_WIDTH],
     const double before[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
@@ -386,9 +386,9 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, increments);
 }
 
-/* Compute the factors f_j of the stage increments in (collocation polynomial at a fraction of a step) - (its
-   value at the end). They are the integrals of the Lagrange polynomials from 1 to the fraction, divided by
-   the weights; they are computed by sums of Legendre polynomials. */
+/* The collocation polynomial at a fraction of a step, minus its value at the end, is the sum of f_j times
+   increment j. Compute the factors f_j: integrals of Lagrange polynomials from 1 to the fraction, divided by
+   the weights, by sums of Legendre polynomials. */
 static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevski_gauss_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -441,7 +441,7 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
 }
 
 /* Squared change of the unknowns by a sweep, as a mean over the stages. The first kowalevski_gauss_PLAIN
-   unknowns have the weight scale, the others, group elements, the weight element_scale. */
+   unknowns have the weight `scale`. The others are group elements and have the weight element_scale. */
 static inline double kowalevski_gauss_change_of(double scale, double element_scale, int count,
     kowalevski_gauss_lanes *before, kowalevski_gauss_lanes *after)
 {
@@ -457,8 +457,8 @@ static inline double kowalevski_gauss_change_of(double scale, double element_sca
     return element_scale * (kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES);
 }
 
-/* Predict the values that sweeps read, from the stage increments of the last steps; predictor is a row of
-   kowalevski_gauss_prediction. */
+/* Predict the values that sweeps read, from the stage increments of the last steps. `predictor` is an index
+   of kowalevski_gauss_prediction. */
 static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
     kowalevski_gauss_lanes reads[kowalevski_gauss_UNKNOWNS])
 {
@@ -474,8 +474,7 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
             reads[r]);
 }
 
-/* Number of the predictor whose prediction is nearest to reads, the values that the last sweep of a step has
-   read. */
+/* Number of the predictor that is nearest to `reads`, the values that the last sweep has read. */
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale, double element_scale,
     kowalevski_gauss_lanes *reads)
 {
@@ -506,7 +505,7 @@ static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
     memcpy(in_next_frame, in_frame, sizeof in_frame); /* to a place that may be unaligned */
 }
 
-/* Store the stage increments of a step from point, whose sum is end, to predict the next step. */
+/* Store the increments of a step that begins at point, to predict the next step; end is their sum. */
 static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT],
     const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments)
 {
@@ -533,19 +532,19 @@ enum {
 #define kowalevski_gauss_SOLVED 2e-18
 /* above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted */
 #define kowalevski_gauss_STALLED 0.8
-/* below this, sweeps end when a change exceeds STALLED times the one before */
+/* at changes below this, sweeps end when a change exceeds STALLED times the one before */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* below this, sweeps end at the second change that is not smaller than the one before */
+/* at changes below this, sweeps end at the second change that is not smaller than the one before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
-/* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */
+/* The last change; how many changes grew in a row; how many changes grew near rounding level. */
 typedef struct {
     double last;
     int rising, rises;
 } kowalevski_gauss_progress;
 
-/* Convergence test: 1 at rounding level, 0 to continue, -1 if too many changes grew. Updates *usual, the
-   factor by which changes shrink, and *first, the sweep from which the next step measures them. */
+/* Convergence test: 1 at rounding level, 0 to continue, -1 if too many changes grew. Updates *usual (the
+   factor by which changes shrink) and *first (the first sweep of the next step whose change is measured). */
 static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_progress *sweeps, int sweep,
     double change)
 {
@@ -796,7 +795,7 @@ static size_t kowalevski_gauss_to_frame(const kowalevski_gauss_members *all, siz
         : left;
 }
 
-/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL: the member has failed. */
 static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size_t m, size_t done,
     const double *x)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 144b4e1e70b152efef773d2a9902ecaa0742cb1ebbd7c6e898b910f8429958a6
+ * body-sha256: 3e59837d7a09f267ae83fef64961631e961faf721603bc0decabd98d775b968a
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -14,7 +14,7 @@ extern "C" {
 #define kowalevski_gauss_CASIMIRS 2 /* Casimirs: A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
 #define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
-enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of params and h */
+enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* number of coefficients: functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* entries of an array over the stages */
 enum { kowalevski_gauss_UNKNOWNS = 8 };     /* unknowns of a stage */
@@ -35,12 +35,12 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect
-   the speed only. Unknowns are offsets from a state, their frame. */
+   the speed only. Unknowns are offsets from a state, which is called their frame. */
 typedef struct {
-    int count;     /* number of steps in increments */
-    int latest;    /* index of the last step in increments */
+    int count;     /* number of steps in the array increments */
+    int latest;    /* index of the last step in the array increments */
     int sweeps;    /* number of the first sweep whose change is measured */
-    int predictor; /* row of kowalevski_gauss_prediction that predicts the next step */
+    int predictor; /* index in kowalevski_gauss_prediction of the predictor for the next step */
     /* steps since the predictors were first compared; they are compared again after every
        kowalevski_gauss_TRIALS steps */
     int age;
@@ -85,10 +85,10 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
     const double change[kowalevski_gauss_DIM]);
 
 /* States at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r *
-   kowalevski_gauss_DIM + i] is x_i at fraction[r]. They serve to find events, are far less accurate than
-   steps, and lie off the symplectic leaf by their error. For a state at an event with the accuracy of steps,
-   make a step of size (fraction - 1) h with a copy of *s. Returns kowalevski_gauss_BAD_ARGUMENT before the
-   first step, and after a change of the state. */
+   kowalevski_gauss_DIM + i] is x_i at fraction[r]. These states serve to find events. They are far less
+   accurate than steps, and lie off the symplectic leaf by their error. For a state at an event with the
+   accuracy of steps, make a step of size (fraction - 1) h with a copy of *s. Returns
+   kowalevski_gauss_BAD_ARGUMENT before the first step, and after a change of the state. */
 kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
     size_t count, double *x);
 

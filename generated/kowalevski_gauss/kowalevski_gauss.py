@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 75ccd5559077904ab7c109826c2e1709cdf204e9b2a90810d0c9682bed9fa029
+# body-sha256: 06131e757bbb7e31a95ec054f3b9ce991cf399e032887e571ee4d60fd346f9b8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -103,7 +103,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -202,12 +203,12 @@ def _next_frame(coef, x, z, k):
 MOST_RISING = 3  # a step fails if the change grows in (number of stages + this) sweeps in a row
 SOLVED = 2e-18  # sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
-ROUNDING = 4e-16  # below this, sweeps end when a change exceeds STALLED times the one before
-NEARLY_ROUNDING = 2e-14  # below this, sweeps end at the second change that is not smaller than the one before
+ROUNDING = 4e-16  # at changes below this, sweeps end when a change exceeds STALLED times the one before
+NEARLY_ROUNDING = 2e-14  # at changes below this, sweeps end at the second change that is not smaller than the one before
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
-# Gauss collocation with nodes c, weights b and matrix A: NODES is c, WEIGHTS is b, MIXING is mu = A diag(1/b). All
-# entries of mu + mu.T are exactly 1 in floating point, which makes the method symplectic.
+# Gauss collocation. NODES are the nodes c, WEIGHTS the weights b. MIXING is mu = A diag(1/b), where A is the
+# Runge-Kutta matrix. All entries of mu + mu.T are exactly 1 in floating point, which makes the method symplectic.
 NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))
 MIXING = np.array([
@@ -221,8 +222,8 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Number of unknowns whose changes are measured relative to |x|: coordinates, time and functionals, which come first.
-# The other unknowns, group elements, have sizes near 1.
+# Number of unknowns whose changes are measured relative to |x|. They come first. The other unknowns are components of
+# group elements, with sizes near 1.
 PLAIN = 4
 
 
@@ -359,7 +360,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -382,7 +383,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -459,7 +460,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b8220b20a06024d1efccfcb61aa80e80c6578a33d6b67c1ae9000318acb9d03f
+ * body-sha256: 37d3e2d446b70614af65519fa469de5b330fa977a8e3daba9b021a9b4fc7d18a
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -14,7 +14,7 @@ extern "C" {
 #define pendulum_euler_CASIMIRS 0 /* Casimirs: none */
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
 #define pendulum_euler_SPEC_SHA256 "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14"
-enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that are functions of params and h */
+enum { pendulum_euler_COEFFICIENTS = 2 }; /* number of coefficients: functions of params and h */
 
 typedef struct {
     double g; /* acceleration of gravity divided by the length of the rod */

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cffa24ac5d90aa71c7a91f9249053bb166100a795e4fd946fdfbf175925fbf1e
+ * body-sha256: 3cf40dec5cf72e37e94d8e69bccaad1c762f72d70e7b5f8b840ece9760a82ec5
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -69,7 +69,7 @@ function energy(params, x, energy) {
 function casimirs(params, x, out) {
 }
 
-/** Pi(x) grad H(x). */
+/** The right-hand side pi(x) grad H(x). */
 function vectorField(params, x, out) {
   const q = x[0];
   const p = x[1];
@@ -94,7 +94,7 @@ const STATUS = {
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps number of successful steps before
+   * @param {number} steps number of successful steps before the failure
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -113,7 +113,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
+/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -141,8 +141,8 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and the coefficients of a very small step are finite.
+ * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
+ * where required, and unless the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -187,7 +187,7 @@ export class Solver {
   params;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5b954dde9aec52cf11914fec642937a2097313adfff7ace1e2f1dd5c3b5b0c9b
+# body-sha256: e4070148bac2ea9373df195e498929bd511374f08a7135d544270e1a1af78228
 import numpy as np
 
 VERSION = "0.1.0"
@@ -103,7 +103,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -143,7 +144,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -166,7 +167,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -236,7 +237,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     g = parameters["g"]
     q = x[..., 0]
     p = x[..., 1]

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 437fd1f21ae9e64cd864b9f290582b5b8d01ee03004f3b412af59c63fa027aed
+ * body-sha256: 888217ebc9bb2be8164bf903e3d3e1a1195effa3c582b7c2438321fb67a7b621
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -47,7 +47,7 @@ static int point_vortices_allowed(const point_vortices_params *params, size_t si
     return 1;
 }
 
-/* All values that depend only on parameters and on the duration of a stage. */
+/* Compute the coefficients that depend on parameters and on the duration of a stage. */
 static void point_vortices_prepare(const point_vortices_params *params, double h, double coef[restrict 1])
 {
     (void)params;
@@ -55,10 +55,10 @@ static void point_vortices_prepare(const point_vortices_params *params, double h
 }
 
 /* ---- Rows of sites ---- */
-/* Segment of a row, with the pointers and numbers that loops over its sites read. */
+/* A segment of a row, with the pointers and numbers that a loop over the sites of the segment reads. */
 typedef struct {
     const point_vortices_solver *s;
-    double *const *x;                  /* see point_vortices_solver */
+    double *const *x;                  /* fields and parameters, as in point_vortices_solver */
     ptrdiff_t from, to;                /* first site of the segment, and the one after the last */
     double *const *start, *const *out; /* start of a stage, and the result; x is its solution y */
     double *const *varied;             /* tangent vector: a variation of x */
@@ -84,7 +84,7 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
     return 1;
 }
 
-/* The record of the whole row. */
+/* The whole row as one segment. */
 static inline point_vortices_row point_vortices_row_of(const point_vortices_solver *s)
 {
     point_vortices_row row;
@@ -98,7 +98,8 @@ static inline point_vortices_row point_vortices_row_of(const point_vortices_solv
 
 enum { point_vortices_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
+/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
+   segment. */
 static size_t point_vortices_units(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
@@ -545,7 +546,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 }
 
 /* ---- Krylov spaces ---- */
-#define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends */
+#define point_vortices_SOLVED 1e-6 /* the iteration for a correction ends at this relative residual */
 #define point_vortices_USEFUL 0.9  /* largest relative residual of an accepted correction */
 /* largest accepted distance of a solution from x, relative to |x| + |first change of x| */
 #define point_vortices_PLAUSIBLE 1.5
@@ -602,9 +603,9 @@ static void point_vortices_multiply(const point_vortices_solver *s, const double
     point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
-/* Compute to = from - v, where v solves A v = s->space[0] with the matrix A of point_vortices_multiply, by
-   GMRES (Y. Saad and M. H. Schultz) with point_vortices_DIRECTIONS directions, without restart. Returns the
-   norm of s->space[0], or infinity if the residual is too large for v to be useful. */
+/* Compute to = from - v, where v solves A v = s->space[0] and point_vortices_multiply multiplies by A. The
+   method is GMRES (Y. Saad and M. H. Schultz) with point_vortices_DIRECTIONS directions, without restart.
+   Returns the norm of s->space[0], or infinity if the residual is too large for v to be useful. */
 static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
 {
@@ -670,7 +671,7 @@ static double point_vortices_corrected(point_vortices_solver *s, const double *c
     return point_vortices_relaxed(s, NULL, now);
 }
 
-/* Largest accepted distance of a solution from x: farther away, solutions are unrelated to the motion. */
+/* Largest accepted distance of a solution from x. Solutions farther away are unrelated to the motion. */
 static double point_vortices_range(point_vortices_solver *s, const double *coef)
 {
     point_vortices_copy(s->y[0], s->x, s);

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c94f20df1689976493262c8e4066d749e2fcc2edb58e04bf47c3890c6620385d
+ * body-sha256: f284de58dd8fe0c0a5feba5e77da4dc020260aa1e0cdfa1503d63c79440270bb
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -23,7 +23,7 @@ typedef struct {
 extern const point_vortices_params point_vortices_default_params;
 
 enum { point_vortices_ARRAYS = 3 };       /* arrays over the sites: fields, then parameters */
-enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
+enum { point_vortices_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
 enum { point_vortices_STAGES = 5 };       /* stages of a step */
 enum { point_vortices_DIRECTIONS = 24 };  /* dimension of a Krylov space */
 enum { point_vortices_DIFFERENCES = 2 };  /* differences in the predictor of a stage */
@@ -79,8 +79,8 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of
    threads. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d4539a697107e03a63667e976f2318c5be653285d52c4f25edc898919f05b518
+# body-sha256: 92ff9a25d33c10f4dad7bc987a18d8bf75caf78cef85732ab3a243fe1954fc08
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,8 +33,9 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
-# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
+# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
+# H, row).
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
@@ -43,7 +44,7 @@ SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
     """
 
     def __init__(self, step, status, states):
@@ -96,8 +97,7 @@ class _Sites:
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
-        arbitrary."""
+        """Return, for each site, the value of its neighbour at an offset. Beyond open ends, the value is arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -163,7 +163,7 @@ def _by_sweeps(coef, x, y, sites):
 
 
 def _remember(differences, value):
-    """Update the list of backward differences with a new value; returns how many of them to sum for the next
+    """Update the list of backward differences with a new value. Returns how many should be summed for the next
     prediction.
 
     It is the number that would have predicted the new value best.
@@ -196,7 +196,7 @@ def _advance(sites, rows, x, past):
 
 
 DIRECTIONS = 24  # dimension of the Krylov space in which a correction is computed
-SOLVED = 1e-6  # relative residual at which the iteration for a correction ends
+SOLVED = 1e-6  # the iteration for a correction ends at this relative residual
 USEFUL = 0.9  # largest relative residual of an accepted correction
 PLAUSIBLE = 1.5  # largest accepted distance of a solution from x, relative to |x| + |first change of x|
 
@@ -326,7 +326,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """All values that depend only on parameters and on the duration of a stage."""
+    """Compute the coefficients that depend on parameters and on the duration of a stage."""
     return [h]
 
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: a5109ec85e4c306a8eea8e578e077c6888309f63af11d3122ed0ff65fe6d30f0
+ * body-sha256: 64ae830064a45690a61e8e548ee9d98324b4e897eac75eb03ce606f12c30ab01
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -20,7 +20,8 @@
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
 enum { predator_prey_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define predator_prey_TOLERANCE 1e-20       /* largest expected next correction of y, relative to y */
+/* iterations end if the next correction is expected to be below this, relative to y */
+#define predator_prey_TOLERANCE 1e-20
 
 static int predator_prey_allowed(const predator_prey_params *params)
 {
@@ -48,27 +49,23 @@ static void predator_prey_prepare(const predator_prey_params *params, double h, 
     coef[10] = -t6;
 }
 
-/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y). */
+/* At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha,
+   the Jacobian of alpha, and the Jacobian of the increment. */
 static void predator_prey_linearise(const double coef[11], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double prey = y[0], predator = y[1];
-    /* momenta */
     const double t1 = 1.0 / predator, t2 = coef[7] * predator;
     const double p_predator = coef[6] + coef[5] * t1 + prey * (t2 + (coef[2] + coef[8] * prey));
     const double t3 = 1.0 / prey, t4 = coef[2] + coef[4] * prey;
     const double p_prey = coef[1] + coef[0] * t3 + predator * (coef[3] * predator + t4);
-    /* displacement */
     const double t5 = expm1((-0.5) * (predator * p_predator)), t6 = expm1(0.5 * (prey * p_prey));
     displacement[0] = prey * t5;
     displacement[1] = predator * t6;
-    /* increment */
     const double t7 = 1.0 + t5, t8 = 1.0 / t7, t9 = 1.0 + t8, t10 = t5 * t9, t11 = 1.0 + t6;
     const double t12 = 1.0 / t11, t13 = 1.0 + t12, t14 = t6 * t13;
     increment[0] = -(prey * t10);
     increment[1] = -(predator * t14);
-    /* jacobian */
     const double t15 = t2 + t4, t16 = predator * t7, t17 = prey * t16, t18 = p_predator * t7;
     const double t19 = coef[7] * prey + coef[10] * (t1 * t1), t20 = p_prey * t11;
     const double t21 = coef[4] * predator + coef[9] * (t3 * t3), t22 = prey * t11, t23 = predator * t22;
@@ -76,7 +73,6 @@ static void predator_prey_linearise(const double coef[11], const double y[2], do
     jacobian[1] = (-0.5) * (prey * t18) - 0.5 * (t19 * t17);
     jacobian[2] = 0.5 * (predator * t20) + 0.5 * (t21 * t23);
     jacobian[3] = 1.0 + (t6 + 0.5 * (t15 * t23));
-    /* increment jacobian */
     const double t24 = t8 * t8, t25 = prey * (0.5 * (t5 * (t16 * t24)) - 0.5 * (t16 * t9));
     const double t26 = t12 * t12, t27 = predator * (0.5 * (t22 * t13) - 0.5 * (t6 * (t22 * t26)));
     increment_jacobian[0] = -(t10 + t15 * t25);
@@ -134,7 +130,7 @@ static int predator_prey_advance(predator_prey_solver *s, const double *change, 
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_DIM],
     double side[predator_prey_DIM])
 {
@@ -238,7 +234,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define predator_prey_SHRINKING 0.25
 
-/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
+/* Largest relative component of the correction delta of y; NaN or infinite if a component is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -253,7 +249,7 @@ static double predator_prey_size(const double y[predator_prey_DIM], const double
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
    effect of the last correction on the increment is added to first order, without another evaluation. So
-   iterations end if the next correction, quadratic in the last, is expected below predator_prey_TOLERANCE. */
+   iterations end if the next correction is expected to be below predator_prey_TOLERANCE. */
 static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 {
     double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0dd1037eafb945e63ed78a746f285ddb716af302cdaa1bb80d2248575491c631
+ * body-sha256: 58c4460a6976e031d23a92ec8f132963050a10a67e473eeb15f830f0c5f788d3
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -14,7 +14,7 @@ extern "C" {
 #define predator_prey_CASIMIRS 0 /* Casimirs: none */
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
-enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
+enum { predator_prey_COEFFICIENTS = 11 }; /* number of coefficients: functions of params and h */
 enum { predator_prey_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5e8e5dcee425104ee7d91d9dccc79fe2f0e121916d34e9a853e3a32686105175
+# body-sha256: 2ee42dc1b7ede6779a5d3d2954b868e62b0f5528bc9a539ee1d012bf2f2daf9c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -107,7 +107,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -145,8 +146,8 @@ def _prepare(parameters, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
-    the increment, all with the momenta p = grad S_h(y)."""
+    """At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta
+    - alpha, the Jacobian of alpha, and the Jacobian of the increment."""
     prey = y[..., 0]
     predator = y[..., 1]
     t1 = 1.0 / predator
@@ -251,7 +252,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
 
     The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction, of the order of the square of the last one, is expected to be below 1e-20. Returns the new x,
+    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
     its compensation term, y, and a status for each member, "" if it was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -307,7 +308,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -330,7 +331,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -403,7 +404,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     growth = parameters["growth"]
     attack = parameters["attack"]
     gain = parameters["gain"]

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 3487ba698e7a35f38a811b1a9aeedf51902f1f5785e3f4be5dc99d76b683174b
+ * body-sha256: aeb595c01222cd83fda77c45f3997bc9998d9cb3677115f5195e2819960e4b62
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -23,8 +23,9 @@ const quaternion_top_params quaternion_top_default_params = { 1.0, 1.5, 2.0, 1.0
 enum { quaternion_top_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 /* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { quaternion_top_TERMS = 30 };
-enum { quaternion_top_SERIES = 84 }; /* Taylor series of a path, those of the coordinates first */
-enum { quaternion_top_FIXED = 1 };   /* values that are constant along a path */
+/* number of Taylor series of a path; those of the coordinates come first */
+enum { quaternion_top_SERIES = 84 };
+enum { quaternion_top_FIXED = 1 }; /* number of values that are constant along a path */
 
 static int quaternion_top_allowed(const quaternion_top_params *params)
 {
@@ -111,7 +112,6 @@ static void quaternion_top_generate(const double coef[47], const double y[7], do
     double jacobian[49])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2], w = y[3], x = y[4], y_ = y[5], z = y[6];
-    /* slope */
     const double t1 = x * y_, t2 = coef[2] * t1, t3 = w * z, t4 = coef[3] * t3, t5 = t2 + t4, t6 = x * z;
     const double t7 = coef[0] * t6, t8 = w * y_, t9 = coef[1] * t8, t10 = t7 + t9, t11 = m3 * m3;
     const double t12 = w * w, t13 = m2 * m2, t14 = z * z, t15 = y_ * y_, t16 = x * x;
@@ -144,7 +144,6 @@ static void quaternion_top_generate(const double coef[47], const double y[7], do
     slope[4] = w * t33 + m1 * (t38 + t40) + x * t42;
     slope[5] = m1 * (t44 + t46) + z * t47 + y_ * t48;
     slope[6] = y_ * t47 + m1 * (t50 + t52) + z * t53;
-    /* jacobian */
     const double t54 = m1 * m2, t55 = t2 + (coef[30] * t54 + t4), t56 = m3 * t55, t57 = m1 * w;
     const double t58 = t29 + (t27 + coef[32] * t57), t59 = x * t58, t60 = m1 * m3;
     const double t61 = t7 + (coef[31] * t60 + t9), t62 = m2 * t61, t63 = m1 * y_;
@@ -307,7 +306,7 @@ static int quaternion_top_advance(quaternion_top_solver *s, const double *change
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_top_DIM],
     double side[quaternion_top_DIM])
 {
@@ -679,7 +678,7 @@ enum {
     /* largest number of pieces of all paths in a stage; steps that need more have errors of the size of the
        state */
     quaternion_top_MOST_PIECES = 512,
-    /* iterations before it is checked whether the approximate Jacobian is good enough */
+    /* after so many iterations, it is checked whether the approximate Jacobian is good enough */
     quaternion_top_PATIENCE = 3,
 };
 /* terms of a series below this, relative to the path, are rounding */
@@ -851,7 +850,7 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Compute for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 if not finite. */
+/* Compute for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 if c is not finite. */
 static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     const double x[quaternion_top_DIM], double gauge[quaternion_top_GAUGES])
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cec14dd8b4af48c86048b6a2f195b4079f955f56357378861eaadf5ba298352a
+ * body-sha256: 3955c70c51b80a0ed0f3c881208f8308ed5835cd7531045da3b9d07e5aaeb43c
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -14,7 +14,7 @@ extern "C" {
 #define quaternion_top_CASIMIRS 1 /* Casimirs: length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
-enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
+enum { quaternion_top_COEFFICIENTS = 47 }; /* number of coefficients: functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
 enum { quaternion_top_DIFFERENCES = 9 }; /* past differences in the predictor; more would amplify rounding */
 

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4b58ccdec64dfc557e5b26dbabc204f13bafa47c8bdfc0055156d7310acd3f2e
+# body-sha256: ac4a048b34352710d067b73dceb927809fe7b88a3bf78b9d6514133e83258f20
 import numpy as np
 
 VERSION = "0.1.0"
@@ -109,7 +109,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -446,7 +447,7 @@ def _generate(coef, y):
 
 LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
 MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
-PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
+PATIENCE = 3  # after so many iterations, it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
 LEAST_SHARE = 1e-5  # terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|
 ROUNDED_SLOPE = 2e-15  # largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt
@@ -797,8 +798,8 @@ def _residual(coef, x, p):
 def _differences(coef, x, p, residual):
     """Return the Jacobian of the residual by p, from differences, and the number of pieces computed of all paths.
 
-    It serves for steps so large that iterations with the approximate Jacobian do not converge. It is NaN for members
-    whose paths cannot be followed.
+    This Jacobian serves for steps so large that iterations with the approximate Jacobian do not converge. It is NaN for
+    members whose paths cannot be followed.
     """
     jacobian, pieces_used = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
@@ -953,7 +954,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -976,7 +977,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -1061,7 +1062,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

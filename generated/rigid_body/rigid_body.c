@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: c41ae2adca99e33237e673aaa605cc4701f04c1b197a4608d15d43280aaa9caf
+ * body-sha256: 5a983d9549a202769de21dc07d7863dee83050a0cece8e02af4b970fea8234df
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -30,9 +30,11 @@
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
 enum { rigid_body_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-enum { rigid_body_CHECKS = 8 }; /* past solutions that the recurrence is tested on, not fitted to */
+/* number of past solutions that test a fitted recurrence; the fit leaves them out */
+enum { rigid_body_CHECKS = 8 };
 enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
-#define rigid_body_TOLERANCE 1e-20 /* largest expected next correction of y, relative to y */
+/* iterations end if the next correction is expected to be below this, relative to y */
+#define rigid_body_TOLERANCE 1e-20
 
 static int rigid_body_allowed(const rigid_body_params *params)
 {
@@ -197,13 +199,12 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
     coef[34] = 12.0 * t41;
 }
 
-/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y). */
+/* At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha,
+   the Jacobian of alpha, and the Jacobian of the increment. */
 static void rigid_body_linearise(const double coef[35], const double y[3], double displacement[restrict 3],
     double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
-    /* momenta */
     const double t1 = x1 * x1, t2 = x2 * x2, t3 = coef[4] * t2, t4 = x3 * x3;
     const double t5 = coef[1] + coef[18] * t1, t6 = coef[9] + coef[16] * t2;
     const double p_x3 = x3 * (t1 * (t3 + coef[17] * t4 + t5) + (coef[14] + t2 * (coef[15] * t4 + t6)));
@@ -213,7 +214,6 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     const double t10 = coef[3] + coef[13] * t1, t11 = coef[10] * t4;
     const double p_x2 =
         x2 * (t1 * (coef[12] * t2 + t7 + t10) + (coef[8] + t4 * (t11 + (coef[9] + coef[11] * t2))));
-    /* displacement */
     const double t12 = x3 * p_x1, t13 = x1 * p_x3, t14 = t12 - t13, t15 = x1 * p_x2, t16 = x2 * p_x1;
     const double t17 = t15 - t16, t18 = p_x3 * t14 - p_x2 * t17, t19 = p_x3 * p_x3, t20 = p_x1 * p_x1;
     const double t21 = p_x2 * p_x2, t22 = t20 + t21, t23 = t19 + t22, t24 = rigid_body_phi0(t23);
@@ -222,11 +222,9 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     displacement[0] = t18 * t24 - 0.5 * t27;
     displacement[1] = t28 * t24 - 0.5 * t14;
     displacement[2] = t24 * t29 - 0.5 * t17;
-    /* increment */
     increment[0] = t27;
     increment[1] = t14;
     increment[2] = t17;
-    /* jacobian */
     const double t30 = x1 * x3 * (coef[25] + coef[27] * t1 + (coef[26] * t4 + coef[22] * t2));
     const double t31 = rigid_body_phi1(t23), t32 = p_x3 * t31, t33 = 0.5 * x2;
     const double t34 = (t14 - t13) * t24 + 2.0 * (t18 * t32) - t33;
@@ -256,7 +254,6 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     jacobian[6] = t49 - t48 + (t30 * t58 + (t40 * t59 + t35 * t60));
     jacobian[7] = t57 + t56 + (t46 * t58 + (t40 * t60 + t47 * t59));
     jacobian[8] = 1.0 + (t50 * t58 + (t30 * t60 + t46 * t59) - t22 * t24);
-    /* increment jacobian */
     const double t61 = x2 * t30, t62 = x3 * t40, t63 = x1 * t46;
     increment_jacobian[0] = t61 - t62;
     increment_jacobian[1] = p_x3 + (x2 * t46 - x3 * t47);
@@ -273,7 +270,6 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
 static void rigid_body_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
     double reciprocal[restrict 3])
 {
-    /* solution */
     const double t1 = 1.0 / matrix[0], t2 = matrix[6] * t1, t3 = matrix[3] * t1;
     const double t4 = side[1] - side[0] * t3, t5 = 1.0 / (matrix[4] - matrix[1] * t3);
     const double t6 = (matrix[7] - matrix[1] * t2) * t5, t7 = matrix[5] - matrix[2] * t3;
@@ -282,7 +278,6 @@ static void rigid_body_eliminate(const double matrix[9], const double side[3], d
     solution[0] = t1 * (side[0] - (matrix[2] * t9 + matrix[1] * t10));
     solution[1] = t10;
     solution[2] = t9;
-    /* reciprocal */
     reciprocal[0] = t1;
     reciprocal[1] = t5;
     reciprocal[2] = t8;
@@ -375,7 +370,7 @@ static int rigid_body_advance(rigid_body_solver *s, const double *change, const 
 
 #define rigid_body_LARGEST_RECIPROCAL 1e3 /* a pivot with a larger reciprocal is far from 1 */
 
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 static int rigid_body_solve_pivoting(double matrix[rigid_body_DIM * rigid_body_DIM],
     double side[rigid_body_DIM])
 {
@@ -406,8 +401,8 @@ static int rigid_body_solve_pivoting(double matrix[rigid_body_DIM * rigid_body_D
     return 1;
 }
 
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting
-   suffices unless a pivot is far from 1; then rows are exchanged. Returns 0 if singular. */
+/* Solve matrix * solution = side. side becomes the solution, and matrix is overwritten. The matrix is I +
+   O(h), so elimination needs no pivoting unless a pivot is far from 1. Returns 0 if matrix is singular. */
 static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], double side[rigid_body_DIM])
 {
     double solution[rigid_body_DIM], reciprocal[rigid_body_DIM], largest = 0.0;
@@ -459,7 +454,8 @@ static void rigid_body_project(int rows, double (*one)[8], int column, double *i
     }
 }
 
-/* Error of the recurrences for values that were not used in the fit, at the end of the array. */
+/* Largest error of the recurrences as predictions of the last values in the array, which were not used in the
+   fit. */
 static double rigid_body_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, CHECKS = rigid_body_CHECKS };
@@ -542,8 +538,8 @@ enum {
     rigid_body_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
-/* Predict the next solution from earlier ones. Returns 0 if none is known, or if the prediction is far from
-   the last one. */
+/* Predict the next solution from earlier solutions. Returns 0 if no solution is known, or if the prediction
+   is far from the last solution. */
 static int rigid_body_predict(const rigid_body_history *history, double value[rigid_body_DIM])
 {
     const int last = history->count - 1;
@@ -565,8 +561,8 @@ static int rigid_body_predict(const rigid_body_history *history, double value[ri
     return last >= 0 && rigid_body_near(value, history->past[last]);
 }
 
-/* After a step with several iterations, whose solution is `value`: select the predictor that would have
-   predicted it best. */
+/* After a step that took several iterations, select the predictor that would have predicted its solution
+   `value` best. */
 static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
 {
     double row[rigid_body_HISTORY + 1][rigid_body_DIM], predicted[rigid_body_DIM], least = HUGE_VAL,
@@ -668,7 +664,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* corrections below NEARLY_SOLVED that do not shrink by this factor are rounding */
 #define rigid_body_SHRINKING 0.25
 
-/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
+/* Largest relative component of the correction delta of y; NaN or infinite if a component is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -683,7 +679,7 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
    effect of the last correction on the increment is added to first order, without another evaluation. So
-   iterations end if the next correction, quadratic in the last, is expected below rigid_body_TOLERANCE. */
+   iterations end if the next correction is expected to be below rigid_body_TOLERANCE. */
 static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 {
     double y[rigid_body_DIM], delta[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM];
@@ -731,8 +727,7 @@ enum {
 #define rigid_body_MESH 0.125
 /* distance between successive sample states, relative to the size of the first state */
 #define rigid_body_SAMPLE_LENGTH 0.25
-/* errors count as equal if they differ by less than this fraction of the sum of all: rounding must not
-   decide */
+/* errors that differ by less than this fraction of the sum of all errors count as equal */
 #define rigid_body_CLOSE_CALL 1e-12
 
 /* Compute the direction of the vector field at a point, a unit vector; 0 at equilibria. */
@@ -818,7 +813,7 @@ static double rigid_body_least_on_line(const rigid_body_params *params, const do
 
 /* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the
    trajectory from x. They are optimised one after the other, starting from the least-squares solution of grad
-   H = sum of gauge[c] grad C_c; 0 where a result is not finite. */
+   H = sum of gauge[c] grad C_c. All factors are 0 if the error that they give is not finite. */
 static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[rigid_body_DIM],
     double gauge[rigid_body_GAUGES])
 {
@@ -912,9 +907,9 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
 /* largest relative change of the state after which predictors are shifted rather than cleared */
 #define rigid_body_NEAR_BY 0.125
 
-/* After a change of the state, shift the past solutions that the extrapolation needs: past solutions of a
-   motion through the new x differ by the change of the state, and by the change of the vector field times the
-   time since then. Recurrences are dropped, since they were fitted to the former motion. After a large
+/* After a change of the state, shift the past solutions that the extrapolation needs: for a motion through
+   the new x, a past solution differs by the change of the state, minus the change of the vector field times
+   the time since then. Recurrences are dropped, since they were fitted to the former motion. After a large
    change, the next step clears the predictors. */
 static void rigid_body_shift_predictors(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
@@ -1214,8 +1209,9 @@ typedef struct {
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
-/* Compute the weights of corrections of y: 1 / (the smallest magnitude of a component of y in all stages),
-   with a bound for small components. So the accuracy of solutions is relative, as in single steps. */
+/* Compute the weight of each component of corrections of y: 1 / (the smallest magnitude of this component of
+   y in all stages), with a bound for small components. The accuracy of solutions is thus relative, as in
+   single steps. */
 static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
@@ -1235,8 +1231,8 @@ static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes u
     }
 }
 
-/* Subtract the correction delta from y; size receives the sum of the magnitudes of its components times their
-   weights, unit. */
+/* Subtract the correction delta from y. size receives the weighted sum of |delta_i|, with the weights
+   `unit`. */
 static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[restrict rigid_body_DIM],
     rigid_body_lanes unit[restrict rigid_body_DIM], rigid_body_lanes size)
 {
@@ -1305,18 +1301,18 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
     rigid_body_take(model, delta, unit, size);
 }
 
-/* Relative sizes of corrections. After one below rigid_body_FROZEN, the matrices are reused. After one below
-   rigid_body_SMALL, whose square is below rounding, a correction below rigid_body_BLOCK_ROUNDING is the
-   last. */
+/* Relative sizes of corrections. After a correction below rigid_body_FROZEN, the matrices are reused. After a
+   correction below rigid_body_SMALL, its square is below rounding, and the next one is the last if it is
+   below rigid_body_BLOCK_ROUNDING. */
 #define rigid_body_FROZEN 1e-4
 #define rigid_body_SMALL 1e-8
 #define rigid_body_BLOCK_ROUNDING 1e-10
 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 #define rigid_body_CAUTION 32.0
 
-/* Estimate the size of the next correction: after the first correction its square; later `size`, the size of
-   the last correction, times the ratio size / before, with a safety margin. The estimate is 0 at rounding
-   level. */
+/* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the
+   one before. The estimate is size^2 after the first correction, later size * size / before with a safety
+   margin, and 0 at rounding level. */
 static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes before,
     rigid_body_lanes left)
 {
@@ -1354,10 +1350,10 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* Advance x + carry through the steps of a block in order. In the linear model of its lane, a step adds
-   increment - gain residual, where the residual is that of the equation for y. The residual of the next step
-   follows from that of the present step, without the new x. most receives the largest correction of y in each
-   lane. */
+/* Advance x + carry through the steps of a block in order. The linear model of a step says that it adds
+   increment - gain * residual to x, with the residual of the equation for y. The residual of the next step
+   follows from the residual of the present step, without the new x. most receives the largest correction of y
+   in each lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
@@ -1369,7 +1365,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int after = (lane + 1) % rigid_body_LANES;
-        /* two partial sums of gain residual, since additions in one sum wait for each other */
+        /* two partial sums of gain * residual, since additions in one sum wait for each other */
         double even[rigid_body_DIM] = { 0.0 }, odd[rigid_body_DIM] = { 0.0 };
         for (int i = 0; i < rigid_body_DIM; ++i) {
             model->residual[i][lane] = residual[i];
@@ -1398,7 +1394,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
 /* Data for all blocks of steps: the coefficients in each lane, and the recurrences that predict the
    solutions. */
 typedef struct {
-    int fits; /* number of the fit that resulted in weight; -1 if there is none */
+    int fits; /* number of the fit that gave the weights; -1 before the first fit */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
 
@@ -1418,7 +1414,8 @@ static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigi
     return rigid_body_largest(most) <= rigid_body_REACH * size;
 }
 
-/* Update the table of a stage, after a new fit of its recurrences: their weights, and the coefficients. */
+/* If the recurrences of a stage have been fitted anew, copy their weights and the coefficients of the stage
+   to the table. */
 static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
     if (table->fits == s->history.fits) return;
@@ -1464,8 +1461,8 @@ static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_bo
     rigid_body_vector_field(&s->params, x, slope);
 }
 
-/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean its
-   increment / h. */
+/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step; mean receives the
+   increment divided by h. */
 static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
     double mean[rigid_body_DIM])
 {
@@ -1565,13 +1562,13 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    /* number of steps whose savings repay the fits; also the first wait after recurrences failed */
+    /* after so many steps in blocks, the fits have paid off; also the first wait after recurrences failed */
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
     rigid_body_MOST_SINGLE_STEPS = 1000, /* largest number of single steps after a failed block */
     /* recurrences are abandoned if a failed block leads to more single steps than this */
     rigid_body_TOO_MANY = 5 * rigid_body_LANES
 };
-#define rigid_body_LATEST 0.125 /* weight of the latest single step in the running mean of its evaluations */
+#define rigid_body_LATEST 0.125 /* weight of the latest single step in the running mean of evaluations */
 
 /* Stop using recurrences. The number of steps until they are tried again doubles with every failure. */
 static void rigid_body_give_up(rigid_body_solver *s)
@@ -1715,7 +1712,7 @@ static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
         : left;
 }
 
-/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL: the member has failed. */
 static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < rigid_body_DIM && all->frames != NULL && done % all->stride == 0; ++i)
@@ -1833,7 +1830,7 @@ static void rigid_body_group_subtract(rigid_body_lanes y[restrict rigid_body_DIM
     }
 }
 
-/* Select the predictor of a stage that would have predicted its solutions y best. */
+/* For a stage with solutions y, select the predictor that would have predicted y best. */
 static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     rigid_body_lanes row[rigid_body_HISTORY + 1][rigid_body_DIM];
@@ -2075,7 +2072,7 @@ static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int
     return status;
 }
 
-/* Integrate one group, from member first on. Returns the first status that is not OK. */
+/* Integrate one group, which begins with member number `first`. Returns the first status that is not OK. */
 static rigid_body_status rigid_body_group_run(const rigid_body_members *all, size_t first)
 {
     rigid_body_group group;

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9aa90775b2c189a037e9ac2593729dbf20fd845659edb772ca0cdf320f965cf1
+ * body-sha256: 1845019cfe84a68a401091c92af0cfb49bf7a38fb38d30c571c049af9a3dd255
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -14,7 +14,7 @@ extern "C" {
 #define rigid_body_CASIMIRS 1 /* Casimirs: C */
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
-enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that are functions of params and h */
+enum { rigid_body_COEFFICIENTS = 35 }; /* number of coefficients: functions of params and h */
 enum { rigid_body_GAUGES = 1 };        /* number of Casimirs whose multiples are subtracted from H: C */
 enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */
 enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
@@ -106,7 +106,7 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 
 /* Between steps: replace the parameters; the state is unchanged. Returns rigid_body_BAD_ARGUMENT, with *s
    unchanged, for parameters that rigid_body_init refuses. */
-/* The gauge, the factors of Casimirs in s->gauge, is unchanged. */
+/* The factors of Casimirs in s->gauge are unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cadbcc22824b525bde3c5142285f649bac029b7af14762aeeea4c467ecbd29f9
+ * body-sha256: 90a4372beaa01381fc8cb5b5d16b8c672a42f641cade6f04ef96655922b43669
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -270,8 +270,8 @@ function prepare(params, gauge, h, coef) {
 }
 
 /**
- * At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
- * increment, all with the momenta p = grad S_h(y).
+ * At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha,
+ * the Jacobian of alpha, and the Jacobian of the increment.
  */
 function linearise(coef, y, displacement, increment, jacobian, incrementJacobian) {
   const x1 = y[0];
@@ -439,7 +439,7 @@ function casimirs(params, x, out) {
   out[0] = x3 * x3 + (x2 * x2 + x1 * x1);
 }
 
-/** Pi(x) grad H(x). */
+/** The right-hand side pi(x) grad H(x). */
 function vectorField(params, x, out) {
   const x1 = x[0];
   const x2 = x[1];
@@ -470,7 +470,7 @@ const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors. */
+/** Number of stored differences; differences of higher order would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 /** Number of sample states along a short piece of the trajectory. */
@@ -489,7 +489,7 @@ const REACH_OF_GRID = 8;
 const MESH = 0.125;
 /** Distance between successive sample states, relative to the size of the first state. */
 const SAMPLE_LENGTH = 0.25;
-/** Errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide. */
+/** Errors that differ by less than this fraction of the sum of all errors count as equal. */
 const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----
@@ -506,7 +506,7 @@ const STATUS = {
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps number of successful steps before
+   * @param {number} steps number of successful steps before the failure
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -525,7 +525,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
+/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -553,8 +553,8 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params gauge".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and the coefficients of a very small step are finite.
+ * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
+ * where required, and unless the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -603,7 +603,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -864,10 +864,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance;
- * returns a status. The effect of the last correction on the increment is added to first order, without
- * another evaluation. So iterations end when the next correction, of the order of the square of the last
- * one, is expected to be below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
+ * the square of the last one.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -940,7 +940,7 @@ class History {
   }
 
   /**
-   * Add the change of the state, to - from, to the last solution; differences are unchanged.
+   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -1108,7 +1108,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error at gauge[c] + t width, from its forward differences; it is a polynomial in gauge[c].
+ * Value of the error at gauge[c] + t width. The error is a polynomial in gauge[c], given by forward
+ * differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
@@ -1149,8 +1150,8 @@ function leastOnLine(params, gauge, c, width, samples) {
 
 /**
  * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c]
- * grad C_c; 0 where a result is not finite.
+ * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c] grad
+ * C_c. All factors are 0 if the error that they give is not finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

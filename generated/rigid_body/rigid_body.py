@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: bf9a8fbbde49db53def0df1f4da1781f0a54c4f30f87f633fff8dd690161dfbc
+# body-sha256: 998c8c92a36b2db635d037fc454b872e3ddf04ab1b7b7423b99c7938e7c30831
 import numpy as np
 
 VERSION = "0.1.0"
@@ -107,7 +107,8 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
+    The parameters must be finite, and positive where the spec requires it. The coefficients of a very small step must
+    be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -349,8 +350,8 @@ def _prepare(parameters, gauge, h):
 
 
 def _linearise(coef, y):
-    """At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of
-    the increment, all with the momenta p = grad S_h(y)."""
+    """At the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta
+    - alpha, the Jacobian of alpha, and the Jacobian of the increment."""
     x1 = y[..., 0]
     x2 = y[..., 1]
     x3 = y[..., 2]
@@ -503,7 +504,7 @@ def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
 
     The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction, of the order of the square of the last one, is expected to be below 1e-20. Returns the new x,
+    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
     its compensation term, y, and a status for each member, "" if it was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
@@ -558,15 +559,15 @@ FIRST_REACH = 24  # points of the first grid on each side of its centre
 REACH_OF_GRID = 8  # points of later grids on each side of the best point so far
 MESH = 0.125  # distance of the points of the first grid, in units of the width |grad H|/|grad C|
 SAMPLE_LENGTH = 0.25  # distance between successive sample states, relative to the size of the first state
-CLOSE_CALL = 1e-12  # errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide
+CLOSE_CALL = 1e-12  # errors that differ by less than this fraction of the sum of all errors count as equal
 
 
 def _line(error_of, gauge, c, width):
     """Return the error as a function of factor c of the gauge, and the sum of the values that determine it.
 
     The function is given by forward differences (DEGREE + 1, members) of its values at gauge[c] + (j - DEGREE / 2)
-    width, j = 0 ... DEGREE. They determine it: the error is a sum of squares of terms that are cubic in H, so it is a
-    polynomial of degree six in each factor.
+    width, j = 0 ... DEGREE. These differences determine the error: it is a sum of squares of terms that are cubic in H,
+    so a polynomial of degree six in each factor.
     """
     shifted, errors = gauge.copy(), []
     for j in range(DEGREE + 1):
@@ -624,7 +625,8 @@ def _choose_gauge(parameters, x):
     """Return factors lambda of Casimirs that minimise the leading error along a short piece of each trajectory.
 
     The result has shape (members, number of factors). The factors are optimised one after the other, starting from the
-    least-squares solution of grad H = sum of lambda grad C; 0 where a result is not finite.
+    least-squares solution of grad H = sum of lambda grad C. The factors of a member are 0 if the error that they give
+    is not finite.
     """
     points = _samples(parameters, x)
     sums = _products(parameters, points).sum(axis=0)
@@ -703,7 +705,7 @@ def _coefficients(parameters, x, h, gauge):
     """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same.
+    (coefficients, 1) if all members have the same coefficients.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -726,7 +728,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -802,7 +804,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """The right-hand side pi(x) grad H(x)."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

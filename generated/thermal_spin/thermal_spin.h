@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2d4629e8d9e46c0bca4c67b81fd07a742d957512a873970859d0a7eb836f9e40
+ * body-sha256: 07d51d42f598c1accb594312cf03afd80fb30d8e70982768c37de62d820efe85
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -15,10 +15,11 @@ extern "C" {
 #define thermal_spin_CASIMIRS 1 /* Casimirs: length */
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
 #define thermal_spin_SPEC_SHA256 "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
-enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that are functions of params and h, and of the noise */
+/* number of coefficients: functions of params and h, and of the noise */
+enum { thermal_spin_COEFFICIENTS = 13 };
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
-enum { thermal_spin_DRAWS = 3 }; /* increments of all sources in a step */
-enum { thermal_spin_PARTS = 1 }; /* increments of one source in a step, one for each part of the step */
+enum { thermal_spin_DRAWS = 3 };   /* increments of all sources in a step */
+enum { thermal_spin_PARTS = 1 };   /* increments of one source in a step, one for each part of the step */
 
 typedef struct {
     double B;            /* field along z */
@@ -89,10 +90,10 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 
-/* thermal_spin_ensemble with other random numbers: member m has those of `seed` and member number
-   first_member + m, from the step number first_step on. thermal_spin_ensemble takes 0 for seed, first_member
-   and first_step. With OpenMP, members are integrated in parallel; the results do not depend on the number of
-   threads. */
+/* As thermal_spin_ensemble, with a choice of random numbers: member m has those of `seed` and of member
+   number first_member + m, from step number first_step on. thermal_spin_ensemble takes 0 for seed,
+   first_member and first_step. With OpenMP, members are integrated in parallel; the results do not depend on
+   the number of threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 748be3fe8cc52aa6e4bb3e31bbd36bc2e1d16cd1b9484f68e0ee33f4c9284a63
+ * body-sha256: 3a8c1f2dacd79c3b4fcd8926b0a1b03034d58aff86c1408d732ff5cfec5b7b33
  */
 #include "toda.h"
 #include <math.h>
@@ -32,7 +32,8 @@ enum { toda_FLOWS = 13 };         /* flows in a step */
 /* Along each axis: the smallest number of sites. */
 static const size_t toda_least[toda_AXES] = { 2 };
 
-/* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
+/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
+   flows. */
 static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
@@ -48,7 +49,7 @@ static int toda_allowed(const toda_params *params, size_t sites)
     return 1;
 }
 
-/* All values that depend only on parameters and on the duration of a flow. */
+/* Compute the coefficients that depend on parameters and on the duration of a flow. */
 static void toda_prepare(const toda_params *params, double h, double coef[restrict 2])
 {
     (void)params;
@@ -57,10 +58,10 @@ static void toda_prepare(const toda_params *params, double h, double coef[restri
 }
 
 /* ---- Rows of sites ---- */
-/* Segment of a row, with the pointers and numbers that loops over its sites read. */
+/* A segment of a row, with the pointers and numbers that a loop over the sites of the segment reads. */
 typedef struct {
     const toda_solver *s;
-    double *const *x;   /* see toda_solver */
+    double *const *x;   /* fields and parameters, as in toda_solver */
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
 } toda_row;
 
@@ -93,7 +94,7 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
     return 1;
 }
 
-/* The record of the whole row. */
+/* The whole row as one segment. */
 static inline toda_row toda_row_of(const toda_solver *s)
 {
     toda_row row;
@@ -106,7 +107,8 @@ static inline toda_row toda_row_of(const toda_solver *s)
 
 enum { toda_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
+/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
+   segment. */
 static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
@@ -128,7 +130,7 @@ static inline double toda_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + toda_ROUNDER, k = shifted - toda_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* those of shifted; the last of them are k */
+    uint64_t bits; /* the bits of shifted; the last ones are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -365,7 +367,7 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* Make steps from the state in s->before, which s->x has too. The last flow of the last step is not made.
+/* Make steps from the state in s->before, which is also in s->x. The last flow of the last step is not made.
    Values are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static toda_status toda_march(toda_solver *s, size_t steps)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4cd11d3699790aaa60f190dc698764f75e5dec1fccedb81ab3bfb9eabaa1a1f4
+ * body-sha256: 40596eb6189b3bd60b167397f2c7dfe6c01521ef905fe7b324e07042a2381ffb
  */
 #ifndef TODA_H
 #define TODA_H
@@ -23,7 +23,7 @@ typedef struct {
 extern const toda_params toda_default_params;
 
 enum { toda_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
-enum { toda_COEFFICIENTS = 28 }; /* numbers that are functions of params and h */
+enum { toda_COEFFICIENTS = 28 }; /* number of coefficients: functions of params and h */
 
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
@@ -59,8 +59,8 @@ size_t toda_work_size(const size_t sizes[toda_AXES]);
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
     const double *x0, void *work);
 
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
    call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
@@ -69,8 +69,8 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 void toda_state(const toda_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range, and
-   arrays x[array][site]; it returns the number of arrays, at most that of fields, or three times that with
-   compensated steps. To restore, call toda_init, then toda_resume with these values. */
+   arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
+   compensated steps. To restore the run, call toda_init, then toda_resume with these values. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *full_range);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

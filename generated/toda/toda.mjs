@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 266f520a6bc5392eeb3631e7fa27cebd4b1c5a2ffd3e1a2fbda32e257325c78a
+ * body-sha256: c333cce436e3f72e99bd7ef8c1d1624c233b3af7e44b4dc00a0c58d87dd439a9
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -50,14 +50,15 @@ const PERIODS = [1];
 const NEAR = [[-1], [1]];
 
 /**
- * For each kind of term of H that open ends remove, the smallest and largest offset of its sites per axis.
+ * Near open ends, some terms of H have no place. For each kind of such terms, the smallest and largest offset
+ * of its sites along each axis.
  */
 const BOUNDS = [];
 
 /** Number of coefficients in a row. */
 const COEFFICIENTS = 2;
 
-/** The times of the flows, as fractions of a step: one for each row of coefficients. */
+/** The durations of the flows, as fractions of a step: one for each row of coefficients. */
 const TIMES = [0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799,
   -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843,
   0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498];
@@ -69,7 +70,7 @@ const SCHEDULE = [[0, 0], [1, 1], [0, 2], [1, 3], [0, 4], [1, 5], [0, 6], [1, 7]
 /** For each part of H, the functions that apply its flow to all sites ("sweeps"), one after the other. */
 const FLOWS = [[sweep1], [sweep2]];
 
-/** All values that depend only on parameters and on the duration of a flow. */
+/** Compute the coefficients that depend on parameters and on the duration of a flow. */
 function prepare(params, h, coef) {
   coef[0] = 2 * h;
   coef[1] = h;
@@ -157,7 +158,7 @@ const STATUS = {
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps number of successful steps before
+   * @param {number} steps number of successful steps before the failure
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -176,7 +177,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
+/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -246,9 +247,9 @@ export class Solver {
   rows = emptyRows();
   /** Copy of the state before the present step, which is restored if the step fails. */
   before;
-  /** Predictors of steps of one size. */
+  /** Predictors of the stages; they are cleared when the step size changes. */
   past = {};
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ec943e8019ea0f9b298f65682ce0875bce10b278ad7a35f3290674df772ed9b7
+# body-sha256: 826a6eb7a5cd55358d41cbe89176a6d866e46b4e71a8af7e1791741db5a4add4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -29,8 +29,9 @@ OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
-# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
+# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
+# H, row).
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))
@@ -39,7 +40,7 @@ SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
     """
 
     def __init__(self, step, status, states):
@@ -90,8 +91,7 @@ class _Sites:
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
-        arbitrary."""
+        """Return, for each site, the value of its neighbour at an offset. Beyond open ends, the value is arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -189,7 +189,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """All values that depend only on parameters and on the duration of a flow."""
+    """Compute the coefficients that depend on parameters and on the duration of a flow."""
     return [2.0 * h, h]
 
 

@@ -343,7 +343,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     further = {"kick": (KICK,) if schedule.multiples else (), "late": late}
     prepare = Kernel(
         "prepare",
-        f"all values that depend only on parameters and on the duration of a {'stage' if solved else 'flow'}",
+        f"compute the coefficients that depend on parameters and on the duration of a {'stage' if solved else 'flow'}",
         {"params": plain_names, "h": (TIME,), **{n: s for n, s in further.items() if s}},
         (Output("coef", tuple(coefficients.values)),),
     )

@@ -53,7 +53,9 @@ def stage_attitude(
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(_element_less_one(group, p, cayley))
-    purpose = f"the attitude increment of {slope}, a {'matrix' if group.matrices else 'quaternion'} minus 1"
+    purpose = (
+        f"the attitude increment of a stage with {slope}: a {'matrix' if group.matrices else 'quaternion'} minus 1"
+    )
     purpose += ", and its translation" * bool(group.translation)
     if group.matrices and not cayley:
         purpose = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"

@@ -20,8 +20,8 @@ def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[s
     if not forced:
         return
     if manner:
-        yield f"forces: {manner}"
-    effect = f"they change {', '.join(pushed)}" if pushed else "they conserve all Casimirs"
+        yield f"forces: {manner}; zeta and f are the covector and vector forces of the spec"
+    effect = f"the forces change {', '.join(pushed)}" if pushed else "the forces conserve all Casimirs"
     yield f"with forces a step is not a Poisson map; {effect}"
 
 

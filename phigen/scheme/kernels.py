@@ -100,8 +100,8 @@ def linearise_kernel(
     equations = tuple((momentum(c), e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
     return Kernel(
         "linearise",
-        "at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the "
-        "increment, all with the momenta p = grad S_h(y)",
+        "at the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha, the "
+        "Jacobian of alpha, and the Jacobian of the increment",
         {"coef": coefficients.slots, "y": coordinates},
         outputs,
         equations,
@@ -290,9 +290,10 @@ def observables(system: System) -> Observables:
     )
     casimirs = tuple(system.casimirs.values())
     formula = field_formula(timed=bool(system.times), forced=system.forces is not None)
+    purpose = f"the right-hand side {formula}"
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
         Kernel("casimirs", "the Casimirs", timeless, (Output("out", casimirs),), role=Role.CASIMIRS),
-        Kernel("vector_field", formula, inputs, (Output("out", field),)),
+        Kernel("vector_field", purpose, inputs, (Output("out", field),)),
         observable_kernel,
     )

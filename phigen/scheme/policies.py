@@ -78,7 +78,7 @@ class PathPolicy(Policy):
         512,
         "largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state",
     )
-    patience: int = count(3, "iterations before it is checked whether the approximate Jacobian is good enough")
+    patience: int = count(3, "after so many iterations, it is checked whether the approximate Jacobian is good enough")
     negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
     least_share: float = number(
         1e-5, "terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|"
@@ -109,9 +109,11 @@ class GaussPolicy(Policy):
     stalled: float = number(
         0.8, "above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted"
     )
-    rounding: float = number(4e-16, "below this, sweeps end when a change exceeds STALLED times the one before")
+    rounding: float = number(
+        4e-16, "at changes below this, sweeps end when a change exceeds STALLED times the one before"
+    )
     nearly_rounding: float = number(
-        2e-14, "below this, sweeps end at the second change that is not smaller than the one before"
+        2e-14, "at changes below this, sweeps end at the second change that is not smaller than the one before"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -122,7 +124,9 @@ class PredictorPolicy(Policy):
     differences."""
 
     reach: float = number(4.0, "largest relative distance of a prediction from the last solution")
-    differences: int = count(9, "number of stored differences; higher ones would amplify rounding errors")
+    differences: int = count(
+        9, "number of stored differences; differences of higher order would amplify rounding errors"
+    )
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,7 @@ class GaugeSearch(Policy):
     )
     close_call: float = number(
         1e-12,
-        "errors count as equal if they differ by less than this fraction of the sum of all: rounding must not decide",
+        "errors that differ by less than this fraction of the sum of all errors count as equal",
     )
 
 
@@ -164,7 +168,7 @@ class TangentPolicy(Policy):
 
     tangent_solved: float = number(1e-15, "a correction below this is rounding")
     tangent_nearly_solved: float = number(1e-10, "a correction below this that no longer shrinks is rounding too")
-    tangent_shrinking: float = number(0.25, "a correction shrinks if below this fraction of the one before")
+    tangent_shrinking: float = number(0.25, "a correction has shrunk if it is below this fraction of the one before")
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,7 @@ class GaussTangentPolicy(Policy):
     tangent_solved: float = number(1e-17, "a relative change below this is rounding")
     tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
     tangent_shrinking: float = number(
-        0.4, "residuals below TANGENT_NEARLY_SOLVED are rounding if their ratio exceeds this"
+        0.4, "residuals below TANGENT_NEARLY_SOLVED are rounding if the ratio of two in a row exceeds this"
     )
 
 
@@ -187,7 +191,7 @@ class GaussAdjointPolicy(Policy):
     )
     adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "below this, sweeps end at the second change that exceeds ADJOINT_STALLED times the one before"
+        1e-12, "at changes below this, sweeps end at the second that exceeds ADJOINT_STALLED times the one before"
     )
 
 
@@ -220,7 +224,7 @@ class LatticeNewtonPolicy(Policy):
     equations."""
 
     directions: int = count(24, "dimension of the Krylov space in which a correction is computed")
-    solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
+    solved: float = number(1e-6, "the iteration for a correction ends at this relative residual")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(
         1.5, "largest accepted distance of a solution from x, relative to |x| + |first change of x|"
@@ -231,9 +235,9 @@ class LatticeNewtonPolicy(Policy):
 class LatticeTangentPolicy(Policy):
     """The linear equation for a tangent vector of a step of a lattice, solved by iterative corrections."""
 
-    carried: float = number(2.0**-54, "the residual of a tangent vector is rounding below this fraction of the vector")
+    carried: float = number(2.0**-54, "a residual below this fraction of the tangent vector is rounding")
     nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is rounding too")
-    carried_shrinking: float = number(0.5, "a residual shrinks if below this fraction of the one before")
+    carried_shrinking: float = number(0.5, "a residual has shrunk if it is below this fraction of the one before")
 
 
 #: The groups of constants of all runtimes, by the name of the file with their definitions in generated code.

@@ -60,7 +60,7 @@ def _on_one_line(first: str, *rest: str) -> list[str]:
 def _kind(program: Program) -> str:
     if program.truncated:
         return "An integrator, which is no Poisson map,"
-    return "An integrator on the leaves, with forces," if program.forced else "A Poisson Hamiltonian integrator"
+    return "An integrator on symplectic leaves, with forces," if program.forced else "A Poisson Hamiltonian integrator"
 
 
 def right_hand_side(program: Program) -> str:

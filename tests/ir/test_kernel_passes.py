@@ -55,20 +55,18 @@ def test_values_of_an_output_are_right_before_its_stores() -> None:
     first, second = call("sin", x), call("cos", y)
     outputs = (Output("one", (first, first)), Output("other_one", (second * second, second)))
     before = kernel(*outputs)
-    expect(in_output_order(before, [], headings=True), """
+    expect(in_output_order(before, [], by_output=True), """
         k(coef, at, params, one, other_one)
           real x = at[0]
           real y = at[1]
-          -- one
           real t:1 = sin(x)
           one[0] <- t:1
           one[1] <- t:1
-          -- other one
           real t:2 = cos(y)
           other_one[0] <- t:2**2
           other_one[1] <- t:2
         """)  # fmt: skip
-    plain = in_output_order(before, [], headings=False)
+    plain = in_output_order(before, [], by_output=False)
     assert [type(s).__name__ for s in plain.body] == ["Declare"] * 4 + ["Assign"] * 4
 
 

@@ -403,7 +403,7 @@ def test_what_cannot_be_combined_is_refused_where_it_stands(text: str, said: str
 def test_headers_say_what_holds_with_forces_and_noise() -> None:
     (_, code), *_ = sorted(emit(compiled("bath").program, "c", "").items())
     for said in (
-        "with forces a step is not a Poisson map; they conserve all Casimirs",
+        "with forces a step is not a Poisson map; the forces conserve all Casimirs",
         "noise: x, y, z; in the sense of",
     ):
         assert said in code

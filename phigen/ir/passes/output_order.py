@@ -12,11 +12,11 @@ from phigen.ir.walk import names_in
 from phigen.symbolic.expression import Expression
 
 
-def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bool) -> ir.Function:
+def in_output_order(function: ir.Function, named: Sequence[str], *, by_output: bool) -> ir.Function:
     """Return the function with its statements ordered by the outputs that they compute.
 
-    First come ``named`` values, which are the momenta. With ``headings``, each output has a comment, its temporaries
-    and then its stores. Otherwise the stores of all outputs come last.
+    First come ``named`` values, which are the momenta. With ``by_output``, the temporaries of an output and then its
+    stores follow, output by output. Otherwise the stores of all outputs come last.
     """
     temporaries = {s.items[0][0]: s for s in function.body if isinstance(s, ir.Declare) and is_temporary(s)}
     stores: dict[str, list[ir.Statement]] = {}
@@ -38,15 +38,12 @@ def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bo
         return [left.pop(name) for name in temporaries if name in needed and name in left]
 
     momenta = taken(named)
-    groups = [(array, taken(names_in(tuple(of))), of) for array, of in stores.items()]
+    groups = [(taken(names_in(tuple(of))), of) for of in stores.values()]
     reads = [s for s in function.body if isinstance(s, ir.Declare) and not is_temporary(s)]
-    if not headings or len(stores) < 2:
-        values = (s for _, declared, _ in groups for s in declared)
-        return function.with_body(*reads, *momenta, *values, *(s for _, _, of in groups for s in of))
-    body = [*reads, *([ir.Comment("momenta"), *momenta] if momenta else [])]
-    for array, declared, of in groups:
-        body += [ir.Comment(array.replace("_", " ")), *declared, *of]
-    return function.with_body(*body)
+    if not by_output:
+        values = (s for declared, _ in groups for s in declared)
+        return function.with_body(*reads, *momenta, *values, *(s for _, of in groups for s in of))
+    return function.with_body(*reads, *momenta, *(s for declared, of in groups for s in (*declared, *of)))
 
 
 def is_temporary(s: ir.Statement) -> bool:

@@ -169,7 +169,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     sizes: Sizes = [("STAGES", len(program.fractions), "stages of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
     sizes.append(
-        ("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that are functions of params and h{also}")
+        ("COEFFICIENTS", max(1, program.step.coefficients), f"number of coefficients: functions of params and h{also}")
     )
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
@@ -261,7 +261,9 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
         )
     if modified:
         error = f"O(h^{program.name}_MODIFIED_POWER)"
-        comment = f"The modified Hamiltonian: a step of size h is its flow, and conserves it, up to {error}."
+        comment = (
+            f"The modified Hamiltonian: a step of size h is the flow of this function, and conserves it, up to {error}."
+        )
         yield comment, [(modified.kernel, "modified_hamiltonian", True)]
 
 
@@ -284,14 +286,14 @@ def _of_attitude(attitude: Attitude) -> Sizes:
     from phigen.scheme.attitude import SIZE_OF_COVECTOR
 
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
-    shown = f"numbers of an attitude, a matrix with {rows} rows" if rows else "numbers of an attitude, a quaternion"
+    shown = f"entries of an attitude: a matrix with {rows} rows" if rows else "entries of an attitude: a quaternion"
     sizes = [("ATTITUDE_SIZE", rows**2 or 4, shown)]
-    position = ", with the position" * bool(group.translation)
-    sizes.append(("ELEMENT", group.size, f"numbers of a group element: an attitude{position}"))
+    position = " and a position" * bool(group.translation)
+    sizes.append(("ELEMENT", group.size, f"entries of a group element: of an attitude{position}"))
     sizes += [("ROWS_OF_ATTITUDE", rows, "rows of an attitude matrix")] if rows else []
-    covector = f"numbers of a covector, and {SIZE_OF_COVECTOR}"
+    covector = f"entries of a covector, then {SIZE_OF_COVECTOR}"
     sizes += [("COVECTOR", len(group.matrices) + 1, covector)] if attitude.exponential else []
-    return sizes + ([("RATE", len(rate.roots), "numbers of the rotation rate of the gauge")] if rate else [])
+    return sizes + ([("RATE", len(rate.roots), "entries of the rate of the gauge rotation")] if rate else [])
 
 
 def _defaults(program: Program) -> str:
@@ -312,7 +314,9 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
     sizes: Sizes = []
     step = program.step
     if step.refresh:
-        sizes.append(("PREPARED", step.prepared, "first coefficients, which depend on params and h only"))
+        sizes.append(
+            ("PREPARED", step.prepared, "number of coefficients that depend on params and h only; they come first")
+        )
     sizes += text_of(program).constants(program, step)
     if has["ADJOINT"]:
         sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
@@ -320,7 +324,9 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         )
     if has["RECURRENCES"]:
         checks = remembered(program, lanes)["CHECKS"]
-        sizes.append(("CHECKS", checks, "past solutions that the recurrence is tested on, not fitted to"))
+        sizes.append(
+            ("CHECKS", checks, "number of past solutions that test a fitted recurrence; the fit leaves them out")
+        )
     if has["BLOCKS"] and isinstance(lanes, Blocks):
         passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
         sizes.append(("PASSES", passes, "iterations of a block that cost as much per step as one evaluation"))

@@ -64,7 +64,7 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
         (
             "PLAIN",
             step.plain,
-            "the first unknowns, whose changes are relative to |x|",
+            "unknowns whose changes are relative to |x|; these come first",
         ),
         (
             "POINT",

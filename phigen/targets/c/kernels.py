@@ -95,7 +95,7 @@ def function(
         built = kernel_function(kernel, members(program), named=exported and whole)
         built = calling(built, versions or (SIMD if lanes else {}))
         built = without_zeros(built) if sparse else built if lanes else zeros_first(built)
-        return built if lanes else in_output_order(built, [name for name, _ in kernel.named], headings=whole)
+        return built if lanes else in_output_order(built, [name for name, _ in kernel.named], by_output=whole)
 
     built = after_passes(whole=True)
     pieces = cut(built, LONGEST_FUNCTION)

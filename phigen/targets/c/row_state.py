@@ -20,8 +20,8 @@ LATTICE = (
         "SEAMS",
         (
             "ptrdiff_t seams[PHI_AXES];"
-            " /* along each axis, the first site of the boundary seam, where colours break their period; the"
-            " size without one */",
+            " /* along each axis, the first site of the boundary seam, where colours break their period; without"
+            " a seam, the number of sites */",
             "ptrdiff_t inside[2];      /* in a row, the first site away from the seam, and the one after the last */",
         ),
     ),
@@ -140,7 +140,7 @@ LATTICE = (
             " /* solution of a stage before and after a sweep, and in the reverse pass; parameters at sites */",
             "double *const *side; /* right-hand side while the equation of the cotangents is solved, else NULL */",
             "double *const *handed, *shares;"
-            " /* cotangents for neighbouring sites; for each row segment, its terms of sums */",
+            " /* contributions to cotangents of other sites; partial sums of row segments */",
             "int wide;                 /* 1 if the cotangents use full-range functions */",
         ),
         reset=("memcpy(s->y[2], s->x, sizeof s->x);",),
@@ -182,7 +182,7 @@ LATTICE = (
         "matrix",
         "SERIES && BANDED",
         (
-            "const double *factored;   /* the coefficients of the factorised matrix, or NULL */",
+            "const double *factored;   /* the coefficients for which the matrix was factorised, or NULL */",
             "double *v[PHI_DIM];       /* a direction of Newton's method */",
             "double *matrix;           /* the factorised band matrix, see phi_factorise */",
         ),
@@ -193,7 +193,7 @@ LATTICE = (
         "SERIES && KRYLOV && SITE_BLOCKS",
         (
             "double *block[PHI_DIM * PHI_DIM], *solved[PHI_DIM];"
-            " /* preconditioner: inverses of the diagonal blocks; their products */",
+            " /* preconditioner: inverses of the diagonal blocks; their products with a vector */",
         ),
         reset=(
             "for (int k = 0; k < PHI_DIM * PHI_DIM; ++k, memory += block) s->block[k] = memory;",
@@ -296,7 +296,7 @@ LATTICE = (
 ROW = (
     StateBlock(
         "x",
-        members=("const phi_solver *s;", "double *const *x;             /* see phi_solver */"),
+        members=("const phi_solver *s;", "double *const *x;             /* fields and parameters, as in phi_solver */"),
         reset=("row.s = s;", "row.x = s->x;"),
     ),
     StateBlock(

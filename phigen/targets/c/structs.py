@@ -9,7 +9,7 @@ TABLE = (
     StateBlock(
         "fits",
         members=(
-            "int PHI_OF(fits, PHI_STAGES); /* number of the fit that resulted in weight; -1 if there is none */",
+            "int PHI_OF(fits, PHI_STAGES); /* number of the fit that gave the weights; -1 before the first fit */",
             "phi_lanes PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS], PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM];",
         ),
     ),
@@ -34,14 +34,14 @@ MODEL = (
         "factors",
         "SPARSE",
         (
-            "/* factors of the Jacobian of alpha(y); Jacobian and corrections of the increment */",
+            "/* LU factors of the Jacobian of alpha(y); Jacobian of the increment; corrections of the increment */",
             "phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];",
         ),
     ),
     StateBlock(
         "inverse",
         "!SPARSE && CENTRED",
-        ("phi_lanes inverse[PHI_DIM * PHI_DIM]; /* a residual r of alpha(y) = x corrects y by -inverse r */",),
+        ("phi_lanes inverse[PHI_DIM * PHI_DIM]; /* for a residual r of alpha(y) = x, y is corrected by -inverse r */",),
     ),
     StateBlock(
         "inverse_and_gain",
@@ -131,7 +131,7 @@ BACK_GROUP = (
         "x",
         members=("phi_lanes x[PHI_BACK_PACKS][PHI_DIM], PHI_OF(coef[PHI_BACK_PACKS], PHI_STAGES)[PHI_COEFFICIENTS];",),
     ),
-    StateBlock("start", "SPLITTING", ("phi_pack start[PHI_BACK_PACKS]; /* the members at their starts */",)),
+    StateBlock("start", "SPLITTING", ("phi_pack start[PHI_BACK_PACKS]; /* the initial states of the members */",)),
     StateBlock(
         "stored",
         "SPLITTING && !RECOMPUTED",
@@ -160,7 +160,7 @@ TRANSPOSE = (
         "states_of_legs",
         "!SERIES && RECOMPUTED",
         (
-            "double *tape;               /* states of a segment, one for every leg steps */",
+            "double *tape;               /* states of a segment, one every `leg` steps */",
             "size_t leg;                 /* number of steps between two states on the tape */",
             "int lost;                   /* 1 if inverse flows did not lead back to a state on the tape */",
             "int anew;                   /* 1 if flows are repeated, since inverse flows are inaccurate */",
@@ -183,11 +183,13 @@ TRANSPOSE = (
     StateBlock("block", members=("size_t block;               /* size of a field, in doubles */",)),
     StateBlock("of_step", "!RECOMPUTED", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
     StateBlock("states", members=("double *states;             /* checkpoints: states at the starts of segments */",)),
-    StateBlock("marks", "SERIES", ("size_t *marks;              /* for each checkpoint, the number of its step */",)),
+    StateBlock(
+        "marks", "SERIES", ("size_t *marks;              /* for each checkpoint, the number of steps before it */",)
+    ),
     StateBlock(
         "marks",
         "!SERIES",
-        ("size_t *marks;              /* for each checkpoint, number of its step and value of s->full_range */",),
+        ("size_t *marks;              /* for each checkpoint, the number of steps before it, and s->full_range */",),
     ),
     StateBlock(
         "counts",

@@ -10,7 +10,8 @@
 #include "solver.c"
 #include "adjoint_lanes.c"
 
-/* Set all members of *s except the state, such as time and number of steps, to their values before the last step. */
+/* Set *s back to the time before the last step: the number of steps, the time and the coefficients, but not the state.
+   */
 static void phi_rewind(phi_solver *s)
 {
     --s->steps;

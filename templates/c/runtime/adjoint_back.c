@@ -2,8 +2,8 @@
 #define PHI_FILE_ADJOINT_BACK
 #include "adjoint.c"
 
-/* Pull the cotangent *bar back through the step that led to *s, by the tape of the step. All members of *s except the
-   state get their values before the step. */
+/* Pull the cotangent *bar back through the step that led to *s, by the tape of the step. *s is set back to the time
+   before the step, except for its state. */
 static phi_status phi_back_step(phi_solver *s, phi_step_tape tape, phi_cotangent *bar)
 {
     phi_rewind(s);

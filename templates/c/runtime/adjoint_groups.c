@@ -28,8 +28,9 @@ static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all,
     return 1;
 }
 
-/* Forward and reverse pass of one batch, whose first member has the number `first`. Members whose lane fails, or that
-   vectorised code cannot treat, are repeated one by one. Returns the first status that is not OK. */
+/* Make the forward and the reverse pass of one batch, whose first member has the number `first`. Members whose lane
+   fails, or that vectorised code cannot treat, are computed again one by one. Returns the first status that is not OK.
+   */
 PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
 {
     phi_group group;

@@ -21,8 +21,9 @@ typedef struct {
 #include "state_of_traced.h"
 } phi_traced;
 
-/* Solve matrix * solutions = sides, both overwritten, by elimination without pivoting: matrices are I + O(h). sides has
-   the given number of columns. wrong becomes infinite in lanes where a pivot is far from 1. */
+/* Solve matrix * solutions = sides by elimination without pivoting: matrices are I + O(h). sides becomes the solutions,
+   matrix is overwritten. sides has the given number of columns. wrong becomes infinite in lanes where a pivot is far
+   from 1. */
 static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_lanes wrong)
 {
     for (int k = 0; k < PHI_DIM; ++k) {
@@ -60,7 +61,8 @@ static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_
 #include "adjoint_newton_lanes.c"
 #include "adjoint_path_lanes.c"
 
-/* Load one stage of a step into a lane: y is its solution on the tape, *at the solver after the step. */
+/* Load one stage of a step into a lane: y is the solution of the stage on the tape, and *at is the solver after the
+   step. */
 static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) g->y[i][lane] = y[i];

@@ -6,13 +6,13 @@
 #include "adjoint_stage.c"
 #include "adjoint_path.h"
 
-#define PHI_BACK_NEGLIGIBLE 1e-18    /* terms of a series below this are negligible, relative to start and sum */
+#define PHI_BACK_NEGLIGIBLE 1e-18    /* terms of a series that are smaller than this, relative to start and sum, are negligible */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* accepted error of the slope of a series, relative to the path and its slope */
-#define PHI_ANCHORED 8               /* largest number of corrections of the end of a path, after which its mean is the solution y */
-#define PHI_ANCHORED_TO 1e-15        /* accuracy of the mean after these corrections, relative to the state */
+#define PHI_ANCHORED 8               /* the end of a path is corrected at most so often to make its mean equal to y */
+#define PHI_ANCHORED_TO 1e-15        /* accuracy that these corrections give to the mean, relative to y */
 
-/* Sum the magnitudes of each group of quantities of a path that is integrated backward: of the state, of its cotangent, of
-   the cotangent of p, and of the cotangents of the coefficients. */
+/* A path that is integrated backward has four groups of quantities: the state, its cotangent, the cotangent of p, and
+   the cotangents of the coefficients. Compute the sum of the magnitudes in each group. */
 static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
 {
     for (int g = 0; g < 4; ++g) sizes[g] = 0.0;
@@ -122,8 +122,8 @@ static int phi_anchor(const double *coef, const double p[PHI_DIM], const double 
 }
 
 /* Pull a cotangent back through a stage whose path had the mean y. Its covector is p = grad S_h(y), with the generating
-   function S_h and its Hessian H. The cotangent w of p solves w = b + B H w, where b comes from the cotangent of the end of
-   the path, and B from its mean. */
+   function S_h and its Hessian H. The cotangent w of p solves w = b + B H w, where b comes from the end of the path,
+   and B from its mean. */
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -8,8 +8,8 @@
 #define PHI_BACK_ACCURACY 1e-17 /* relative accuracy of the derivatives of paths */
 
 #if PHI_ALONG
-/* Compute the Taylor series of the derivatives of the paths by the coefficients that pi depends on, to the order of the
-   derivatives by p. */
+/* Compute the derivatives of the paths by those coefficients on which pi depends. They are Taylor series, to the same
+   order as the derivatives by p. */
 static void phi_vary_coefficients(phi_expansion *e)
 {
     memset(e->w[0], 0, sizeof e->w[0]);
@@ -36,8 +36,8 @@ static void phi_vary_coefficients(phi_expansion *e)
 }
 
 #endif
-/* Compute the derivatives of the starts and of the changes of the paths, by their middles and by p. They follow from
-   the sums of the even and of the odd terms of the series. */
+/* Compute how the start of each path, and its change from start to end, depend on the middle of the path and on p:
+   derivatives, from the sums of the even and of the odd terms of the series. */
 static void phi_ends_of_slopes(phi_expansion *e)
 {
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {

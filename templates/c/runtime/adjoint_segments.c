@@ -38,8 +38,8 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
     return 1;
 }
 
-/* Address on the tape for batch k at the start of the segment that begins with step `begin`: its states, then its
-   compensation terms. */
+/* Where the tape holds batch k at the start of a segment: its states, then its compensation terms. The segment begins
+   after `begin` steps. */
 static const double *phi_pull_left(const phi_group *group, int k, const phi_pulled *all, size_t begin)
 {
     return all->tape + ((begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k) * 2 * PHI_DIM * PHI_LANES;

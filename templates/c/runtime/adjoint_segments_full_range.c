@@ -16,8 +16,8 @@ static int phi_pull_finite(const phi_group *group)
     return phi_finite(sum, PHI_LANES);
 }
 
-/* Make steps. If values become not finite, restore the initial states, select functions for arguments of any size for all
-   further steps, and return 0. */
+/* Make steps. If values are not finite afterwards, restore the initial states and return 0; all further steps then use
+   functions for arguments of any size. */
 static int phi_pull_steps(phi_group *group, int steps, const phi_back_group *bar)
 {
     if (group->full_range) phi_steps_full_range_lanes(group, steps);

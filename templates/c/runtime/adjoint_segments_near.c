@@ -2,7 +2,7 @@
 #define PHI_FILE_ADJOINT_SEGMENTS_NEAR
 #include "adjoint_segments.c"
 
-/* Make steps. */
+/* Make a number of steps of all members; always returns 1. */
 static int phi_pull_steps(phi_group *group, int steps, const phi_back_group *bar)
 {
     (void)bar;

@@ -6,8 +6,8 @@
 #include "adjoint_stage.c"
 #include "adjoint_flows.h"
 
-/* Pull a cotangent back through the flows number first ... last of a step, in reverse order. y are the states before
-   all flows. */
+/* Pull a cotangent back through the flows number first ... last of a step, in reverse order. y has the state before
+   each flow. */
 static void phi_flows_back(const double *coef, phi_step_tape y, int first, int last, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

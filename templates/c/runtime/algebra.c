@@ -14,8 +14,8 @@ PHI_CHAPTER_OF_ALGEBRA
 
 #include "elapsed.c"
 
-/* Add change to coordinate i within a step: displacement is the sum of the changes so far and the compensation term,
-   and x is start + displacement, rounded. */
+/* Add change to coordinate i within a step. displacement is the sum of the compensation term and of the changes so far;
+   x is the rounded sum start + displacement. */
 static inline void phi_add(double x[PHI_DIM], double displacement[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
     displacement[i] += change;
@@ -39,7 +39,7 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double di
 #endif
 #include "device_linear.c"
 #if !PHI_DEVICE
-/* Solve matrix * solution = side, both overwritten, by elimination with pivoting. Returns 0 if singular. */
+/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
 #if PHI_UNROLLED
 static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 #else
@@ -74,8 +74,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_UNROLLED
-/* Solve matrix * solution = side, both overwritten. The matrix is I + O(h), so elimination without pivoting suffices
-   unless a pivot is far from 1; then rows are exchanged. Returns 0 if singular. */
+/* Solve matrix * solution = side. side becomes the solution, and matrix is overwritten. The matrix is I + O(h), so
+   elimination needs no pivoting unless a pivot is far from 1. Returns 0 if matrix is singular. */
 static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
     double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
@@ -89,8 +89,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_NEWTON && PHI_ADJOINT
-/* Solve matrix^T * solution = side, both overwritten. matrix^T has another pattern of zeros than matrix, so it has
-   elimination code of its own. Returns 0 if singular. */
+/* Solve matrix^T * solution = side. side becomes the solution, and matrix is overwritten. Zeros of matrix^T are at
+   other places than those of matrix, so its elimination is separate code. Returns 0 if matrix is singular. */
 static int phi_solve_transposed(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
 #if PHI_UNROLLED_TRANSPOSE

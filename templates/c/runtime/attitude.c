@@ -52,7 +52,7 @@ static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int
     for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k] PHI_AND_ASIDE_OF_BLOCK);
 }
 
-/* Initialise the attitude of the present state with the group element first. */
+/* Make the group element `first` the attitude of the present state. */
 static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memset(s->turned_carry, 0, sizeof s->turned_carry);

@@ -56,7 +56,8 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_uniform_position(rate, t, speed, scale, element);
 }
 
-/* Rotate the rate of the gauge rotation into the frame where momenta are constant; element is that of the attitude. */
+/* Rotate the rate of the gauge rotation into the frame where momenta are constant. element is the attitude as a group
+   element. */
 static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     double change[3];

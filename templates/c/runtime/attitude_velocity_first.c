@@ -2,8 +2,8 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_FIRST
 #include "model.h"
 
-/* Before the rate is rotated into body coordinates: change its velocity, rate[3..5], from that of the space point at the
-   origin to that of the body point at the position of the body. */
+/* rate[3..5] is a velocity. Before it is rotated into body coordinates, it must be the velocity at the position of the
+   body. Compute this velocity from the velocity at the origin of space. */
 static inline void phi_leave_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

@@ -2,8 +2,8 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_LAST
 #include "model.h"
 
-/* After the rate has been rotated into space coordinates: change its velocity, rate[3..5], from that of the body point at
-   the position of the body to that of the space point at the origin. */
+/* rate[3..5] is a velocity. After it has been rotated into space coordinates, it is the velocity at the position of the
+   body. Compute from it the velocity at the origin of space. */
 static inline void phi_reach_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

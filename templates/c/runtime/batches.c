@@ -19,7 +19,7 @@ enum {
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
 #if PHI_SPLITTING
-    phi_lanes start[PHI_DIM]; /* x at the start of the step; during a step, carry holds the sum of its increments */
+    phi_lanes start[PHI_DIM]; /* x at the start of the step; carry holds the sum of the increments since then */
 #endif
 } phi_pack;
 
@@ -191,7 +191,7 @@ static phi_status phi_group_end(const phi_group *group, int m, const phi_members
     return status;
 }
 
-/* Integrate one group, from member first on. Returns the first status that is not OK. */
+/* Integrate one group, which begins with member number `first`. Returns the first status that is not OK. */
 PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;

@@ -21,8 +21,8 @@ PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int distinct_co
     }
 }
 
-/* Make steps of a group: each stage for all batches before the next stage. distinct_coef = 0: all members have the
-   coefficients of the first lane. */
+/* Make steps of a group. Each stage is made for all batches before the next stage. With distinct_coef = 0, all members
+   have the coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step)

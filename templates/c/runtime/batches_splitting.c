@@ -19,8 +19,8 @@ static void phi_end_lanes(phi_group *group)
     }
 }
 
-/* Make steps of a group: each flow for all batches before the next flow. distinct_coef = 0: all members have the
-   coefficients of the first lane. */
+/* Make steps of a group. Each flow is applied to all batches before the next flow. With distinct_coef = 0, all members
+   have the coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {

@@ -34,7 +34,8 @@ static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
     return phi_largest(most) <= PHI_REACH * size;
 }
 
-/* Update the table of a stage, after a new fit of its recurrences: their weights, and the coefficients. */
+/* If the recurrences of a stage have been fitted anew, copy their weights and the coefficients of the stage to the
+   table. */
 static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 {
     if (PHI_OF(table->fits, stage) == PHI_OF(s->history, stage).fits) return;
@@ -86,7 +87,8 @@ static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_D
     phi_make_per_tau(&s->params, x, slope);
 }
 
-/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean its increment / h. */
+/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step; mean receives the increment
+   divided by h. */
 static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, double x[PHI_DIM], double mean[PHI_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
@@ -171,11 +173,11 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps whose savings repay the fits; also the first wait after recurrences failed */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* after so many steps in blocks, the fits have paid off; also the first wait after recurrences failed */
     PHI_MOST_SINGLE_STEPS = 1000,     /* largest number of single steps after a failed block */
     PHI_TOO_MANY = 5 * PHI_LANES      /* recurrences are abandoned if a failed block leads to more single steps than this */
 };
-#define PHI_LATEST 0.125 /* weight of the latest single step in the running mean of its evaluations */
+#define PHI_LATEST 0.125 /* weight of the latest single step in the running mean of evaluations */
 
 /* Stop using recurrences. The number of steps until they are tried again doubles with every failure. */
 static void phi_give_up(phi_solver *s)

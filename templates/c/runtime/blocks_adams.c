@@ -6,7 +6,7 @@
 
 enum {
     PHI_STRIDES = 2, /* Runge-Kutta steps in place of one step */
-    PHI_MEETINGS = 2 /* iterations of a stage after which its point y nearly satisfies alpha(y) = x; the first stage takes one more */
+    PHI_MEETINGS = 2 /* iterations after which y in a stage nearly satisfies alpha(y) = x; the first stage takes one more */
 };
 
 #define PHI_ASTRAY 1e-3 /* largest accepted difference of predicted and corrected x, relative to |x| + |increment|; measured */
@@ -24,7 +24,8 @@ static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM
         phi_runge_kutta(s PHI_AND_T(t + part * h / (double)PHI_STRIDES), h / (double)PHI_STRIDES, x, mean);
 }
 
-/* Store the vector field at x as slope number `done` of the table; slope PHI_PAST is that at the present state. */
+/* Store the vector field at x as slope number `done` of the table. Slope number PHI_PAST belongs to the present state.
+   */
 static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
 {
     double here[PHI_DIM];
@@ -120,7 +121,7 @@ static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM],
     }
 }
 
-/* Make one fixed-point iteration for alpha(y) = begin, the equation of the points y of a stage. */
+/* Make one fixed-point iteration for the points y of a stage, which solve alpha(y) = begin. */
 static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin[restrict PHI_DIM])
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -131,9 +132,9 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
 }
 
 /* Predict the solutions of a block without recurrences. The states at the starts of all steps are predicted first; then
-   each lane iterates the stages of its step. The starting value of y in a stage is the start of the stage plus half the
-   exact increment. If y is the mean of the ends of a stage, the error of this value is of third order in the size of
-   the stage, else of second order. Its factor is fitted to the earlier stages of the step. */
+   each lane iterates the stages of its step. In a stage, y starts at the start of the stage plus half the exact
+   increment. The error of this starting value is of third order in the size of the stage if y is the mean of start and
+   end, else of second order. The constant in this error is fitted to the earlier stages of the step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM], predicted[PHI_DIM], missed[PHI_DIM];

@@ -4,9 +4,9 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Advance x + carry through the steps of a block in order. In the linear model of its lane, a step adds increment -
-   gain residual, where the residual is that of the equation for y. The residual of the next step follows from that of the
-   present step, without the new x. most receives the largest correction of y in each lane. */
+/* Advance x + carry through the steps of a block in order. The linear model of a step says that it adds increment -
+   gain * residual to x, with the residual of the equation for y. The residual of the next step follows from the
+   residual of the present step, without the new x. most receives the largest correction of y in each lane. */
 static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
     phi_lanes most)
 {
@@ -38,7 +38,7 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
             sum[i] = total;
         }
 #else
-        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two partial sums of gain residual, since additions in one sum wait for each other */
+        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two partial sums of gain * residual, since additions in one sum wait for each other */
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_IN(model, stage, residual)[i][lane] = residual[i];
             for (int j = 0; j < PHI_DIM; j += 2) even[i] += PHI_IN(model, stage, gain)[i * PHI_DIM + j][lane] * residual[j];

@@ -4,8 +4,8 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Compute, for the step in each lane, the product of 1 + gain over its stages. This matrix maps the residual of the
-   first stage to its contribution to the residual of the first stage of the next step. */
+/* Compute, for the step in each lane, the product of 1 + gain over its stages. This matrix says how the residual of the
+   first stage contributes to the residual of the first stage of the next step. */
 static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
 {
     memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);
@@ -77,7 +77,7 @@ static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DI
     }
 }
 
-/* Compute the Newton corrections of y (delta) and of the increment (gained) of a stage from its residual. */
+/* From the residual of a stage, compute the Newton corrections of its y (delta) and of its increment (gained). */
 static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM],
     phi_lanes gained[restrict PHI_DIM])
 {
@@ -92,9 +92,9 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 #endif
 }
 
-/* Correct the points y of all stages by their residuals, and advance x + carry through all steps. In its linear model, a
-   stage adds increment - gain residual. The residual of the next stage follows from that of the present stage, without the
-   new x. most receives the largest correction of y in each lane. */
+/* Correct the points y of all stages by their residuals, and advance x + carry through all steps. The linear model of a
+   stage says that it adds increment - gain * residual to x. The residual of the next stage follows from the residual of
+   the present stage, without the new x. most receives the largest correction of y in each lane. */
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {

@@ -3,7 +3,7 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* Index of component i of difference k in the shared memory of a work group, from the first number of a work item on. */
+/* Where shared memory holds component i of difference k, counted from the first number of a work item. */
 static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
 
 

@@ -19,21 +19,21 @@ enum {
 #define PHI_GAIN_OF_ROUND 1e-4 /* terms are added until they are smaller than this fraction of the error of the middle */
 
 /* The path dm/dt = pi(m) p in each lane, as Taylor series about its middle: with p/2 in place of p, time goes from -1
-   to 1, and fewer terms are needed than from the start. s[i][k] is coefficient k of series i, and the coordinates are
-   the first series. slope has the series of the entries of d(pi p)/dm and of pi. They give v, the derivatives of the
-   path by its middle and by p, row by row. */
+   to 1, and fewer terms are needed than from the start. s[i][k] is coefficient k of series i; the coordinates are the
+   first series. slope has the series of the entries of d(pi p)/dm and of pi, from which v follows: the derivatives of
+   the path by its middle and by p, row by row. */
 typedef struct {
     phi_lanes p[PHI_DIM], fixed[PHI_FIXED], slope_fixed[PHI_SLOPE_FIXED], value[PHI_SERIES];
     phi_lanes s[PHI_SERIES][PHI_TERMS_OF_LANES + 1], slope[PHI_SLOPE_SERIES][PHI_SLOPE_TERMS + 1];
     phi_lanes v[PHI_SLOPE_TERMS + 1][2 * PHI_DIM * PHI_DIM];
-    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of the terms of even and of odd order; mean of the even terms over the time */
+    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of the terms of even and of odd order; time average of the even terms */
     phi_lanes v_even[2 * PHI_DIM * PHI_DIM], v_odd[2 * PHI_DIM * PHI_DIM], v_mean[2 * PHI_DIM * PHI_DIM];
 #if PHI_ALONG
     phi_lanes w[PHI_SLOPE_TERMS + 1][PHI_DIM * PHI_USED]; /* derivatives of the path by coefficients */
     phi_lanes w_even[PHI_DIM * PHI_USED], w_odd[PHI_DIM * PHI_USED], w_mean[PHI_DIM * PHI_USED];
 #endif
     phi_lanes unit[PHI_DIM]; /* weights of the terms in the error estimate */
-    int terms, varied; /* number of known orders of the paths, and of their derivatives */
+    int terms, varied; /* how many orders of the paths, and of their derivatives, are known */
 } phi_expansion;
 
 /* Largest of the values in the lanes. Values that are not finite belong to failed lanes and are left out. */
@@ -157,7 +157,7 @@ static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes
     phi_check_end(coef, e, end, end_slope, wrong);
 }
 
-/* Start the expansions of the paths with mean y at their best known middles, y + middle. */
+/* Start the expansions of the paths whose mean is y. Their middles are y + middle, as far as known. */
 static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e)
 {
@@ -169,8 +169,9 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
     phi_begin(coef, e, m);
 }
 
-/* Find the middles y + middle of the paths with mean y by iteration. Each iteration gains some digits, and sums no more
-   terms than these digits need; the last expansion can be extended. middle becomes infinite in lanes that do not converge. */
+/* Find the middles y + middle of the paths whose mean is y, by iteration. Each iteration gains some digits, and sums no
+   more terms than these digits need; the last expansion can be extended. middle becomes infinite in lanes that do not
+   converge. */
 static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e, double accuracy)
 {
@@ -247,7 +248,7 @@ static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 static void phi_vary(phi_lanes coef[restrict], phi_expansion *e, double accuracy)
 {
     phi_lanes slope[PHI_SLOPE_SERIES], size;
-    double largest = 1.0, next = 1.0; /* size of the last two orders, and expected size of the next two */
+    double largest = 1.0, next = 1.0; /* size of the terms of the last two orders, and expected size of the next two */
     phi_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < PHI_SLOPE_SERIES; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);

@@ -123,8 +123,8 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target, double mo
 #endif
 }
 
-/* Advance f->now from the last whole step to the target, by part of a step. Newton's iteration finds the size of the part
-   from dt/dtau; if steps are equal in time, its first result is exact. */
+/* Advance f->now from the last whole step to the target, by a part of a step. Newton's iteration finds the size of the
+   part. It needs dt/dtau where steps are equal in a time tau; else its first result is exact. */
 static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 {
     double part = 0.0;
@@ -229,7 +229,7 @@ typedef struct {
     bool logging, may_return_early;
 } phi_fmu;
 
-/* Send a message to the logger of the environment; name is that of the instance. */
+/* Send a message to the logger of the environment; name is the name of the instance. */
 static void phi_fmu_say(const phi_fmu_callbacks *to, const char *name, const char *message)
 {
     if (to->log_2 != NULL) to->log_2(to->environment, name, fmi2Error, "logStatusError", "%s", message);

@@ -82,7 +82,7 @@ FMI3_STATUS(EnterInitializationMode)(void *of, bool has_tolerance, double tolera
     return fmi3OK;
 }
 
-/* If this fails, the environment may set other values and call it again. */
+/* If this function fails, the environment may set other values and call it again. */
 FMI3_STATUS(ExitInitializationMode)(void *of)
 {
     if (phi_fmi3_enter(of, PHI_INITIALISING, PHI_INITIALISING) != fmi3OK) return fmi3Error;
@@ -241,7 +241,7 @@ FMI3_STATUS(SerializeFMUState)(void *of, void *state, uint8_t bytes[], size_t si
     return fmi3OK;
 }
 
-/* If this fails, *state is unchanged. */
+/* If this function fails, *state is unchanged. */
 FMI3_STATUS(DeserializeFMUState)(void *of, const uint8_t bytes[], size_t size, void **state)
 {
     uint64_t checksum = 0;

@@ -84,9 +84,9 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
     return best;
 }
 
-/* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from x.
-   They are optimised one after the other, starting from the least-squares solution of grad H = sum of gauge[c] grad C_c; 0
-   where a result is not finite. */
+/* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
+   x. They are optimised one after the other, starting from the least-squares solution of grad H = sum of gauge[c] grad
+   C_c. All factors are 0 if the error that they give is not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double samples[PHI_SAMPLES][PHI_DIM], out[1 + 2 * PHI_GAUGES], sums[1 + 2 * PHI_GAUGES] = { 0.0 };

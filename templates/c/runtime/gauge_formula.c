@@ -6,7 +6,7 @@
 
 #include "model.h"
 
-/* Compute for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 if not finite. */
+/* Compute for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 if c is not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double out[1 + 2 * PHI_GAUGES];

@@ -53,9 +53,9 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* Compute the factors f_j of the stage increments in (collocation polynomial at a fraction of a step) - (its value at
-   the end). They are the integrals of the Lagrange polynomials from 1 to the fraction, divided by the weights; they are
-   computed by sums of Legendre polynomials. */
+/* The collocation polynomial at a fraction of a step, minus its value at the end, is the sum of f_j times increment j.
+   Compute the factors f_j: integrals of Lagrange polynomials from 1 to the fraction, divided by the weights, by sums of
+   Legendre polynomials. */
 static void phi_factors_at(double fraction, double factor[PHI_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -95,7 +95,7 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
 }
 
 /* Squared change of the unknowns by a sweep, as a mean over the stages. The first PHI_PLAIN unknowns have the weight
-   scale, the others, group elements, the weight element_scale. */
+   `scale`. The others are group elements and have the weight element_scale. */
 static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -109,7 +109,8 @@ static inline double phi_change_of(double scale, double element_scale, int count
     return element_scale * (phi_total(sum) / (double)PHI_NODES);
 }
 
-/* Predict the values that sweeps read, from the stage increments of the last steps; predictor is a row of phi_prediction. */
+/* Predict the values that sweeps read, from the stage increments of the last steps. `predictor` is an index of
+   phi_prediction. */
 static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READ_COUNT])
 {
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
@@ -119,7 +120,7 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
         for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
-/* Number of the predictor whose prediction is nearest to reads, the values that the last sweep of a step has read. */
+/* Number of the predictor that is nearest to `reads`, the values that the last sweep has read. */
 static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READ_COUNT];
@@ -176,7 +177,7 @@ static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], cons
 }
 
 #endif
-/* Store the stage increments of a step from point, whose sum is end, to predict the next step. */
+/* Store the increments of a step that begins at point, to predict the next step; end is their sum. */
 static void phi_remember(phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;
@@ -211,14 +212,14 @@ static void phi_remember(phi_solver *s, double point[PHI_POINT], const double en
 
 #include "gauss_policy.h"
 
-/* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */
+/* The last change; how many changes grew in a row; how many changes grew near rounding level. */
 typedef struct {
     double last;
     int rising, rises;
 } phi_progress;
 
-/* Convergence test: 1 at rounding level, 0 to continue, -1 if too many changes grew. Updates *usual, the factor by
-   which changes shrink, and *first, the sweep from which the next step measures them. */
+/* Convergence test: 1 at rounding level, 0 to continue, -1 if too many changes grew. Updates *usual (the factor by
+   which changes shrink) and *first (the first sweep of the next step whose change is measured). */
 static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep, double change)
 {
     const double rate = change / sweeps->last;

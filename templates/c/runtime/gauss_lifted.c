@@ -5,9 +5,9 @@
 #include <string.h>
 
 /* ---- Frames of group elements ---- */
-/* The unknowns contain quaternions F ("frames"): F* k F is the vector y, a linear function of x. In a step F becomes F
-   + w, the frame of the next step. Compute the first F: a rotation from y to k or to -k, whichever is nearer, times
-   |y|^1/2. */
+/* Some unknowns are components of quaternions F ("frames"), with F* k F = y: k is the unit quaternion, y a vector that
+   is linear in x. A step adds a change to F. Compute the first F: |y|^1/2 times the rotation of y to k or -k, whichever
+   is nearer. */
 static void phi_lift_one(const double y[3], double f[4])
 {
     const double length = sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2]), half = sqrt(0.5 * (length + fabs(y[2])));
@@ -18,8 +18,8 @@ static void phi_lift_one(const double y[3], double f[4])
     f[3] = y[2] >= 0.0 ? 0.0 : a;
 }
 
-/* Multiply the frame f by the rotation exp(t k) that brings it nearest to an old frame, so that predictions by old
-   increments remain valid. */
+/* Multiply the frame f by the rotation exp(t k) that brings it nearest to an old frame, so that old increments can
+   still predict the next step. */
 static void phi_align(const double old[4], double f[4])
 {
     const double a = f[0] * old[0] + f[1] * old[1] + f[2] * old[2] + f[3] * old[3];

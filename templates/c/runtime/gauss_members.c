@@ -13,7 +13,8 @@ enum {
     PHI_GROUP = PHI_LANES, /* number of members, one in each lane */
     PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one after the other, with a stage in each lane */
 };
-/* Largest accepted error of the slowest member. With PHI_SOLVED the energy drifts by 1e-18 of its size in each step. */
+/* Largest accepted error of the slowest member. With the larger PHI_SOLVED, the energy would drift by 1e-18 of its size
+   in each step. */
 #define PHI_GROUP_SOLVED (0.25 * PHI_SOLVED)
 
 /* Values of the unknowns of all members, for each stage. */
@@ -25,8 +26,8 @@ typedef struct {
     phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* weights h b_j of the stages */
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame at the end of the last step */
-    int latest;    /* index of the last step in increments */
-    int count;     /* number of steps in increments */
+    int latest;    /* index of the last step in the array increments */
+    int count;     /* number of steps in the array increments */
     int predictor; /* row of phi_prediction by which the next step is predicted */
     int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
     int sweeps;    /* number of the first sweep whose change is measured */
@@ -40,7 +41,8 @@ typedef struct {
 #endif
 } phi_group;
 
-/* Predict the unknowns of stage i from the stage increments of the last steps; predictor is a row of phi_prediction. */
+/* Predict the unknowns of stage i from the stage increments of the last steps. `predictor` is an index of
+   phi_prediction. */
 static void phi_group_predict(phi_group *group, int predictor, int i, phi_lanes z[PHI_UNKNOWNS])
 {
     phi_lanes older[PHI_UNKNOWNS];
@@ -53,7 +55,8 @@ static void phi_group_predict(phi_group *group, int predictor, int i, phi_lanes 
     }
 }
 
-/* Add to sum the squares of the differences of two arrays of unknowns, those of coordinates multiplied by scale. */
+/* Add the squared differences between two arrays of unknowns to sum. Those of coordinates are first multiplied by
+   scale. */
 static inline void phi_group_compare(const phi_lanes scale, phi_lanes before[PHI_UNKNOWNS], phi_lanes after[PHI_UNKNOWNS], phi_lanes sum)
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {

@@ -2,7 +2,8 @@
 #define PHI_FILE_GAUSS_REDUCED
 #include <string.h>
 
-/* Fixed-point sweeps iterate some of the unknowns only. They read time integrals of these; the other unknowns follow. */
+/* Fixed-point sweeps iterate only some of the unknowns, and read the time integrals of these. All other unknowns
+   follow. */
 #define PHI_READ(r) phi_iterated[phi_reads[r]] /* the unknown whose integral is value r */
 
 /* Set the factors of each stage that a sweep reads: h times its weight, its time as a fraction of the step, and h. */
@@ -32,8 +33,8 @@ static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], ph
     for (int r = 0; r < PHI_ITERATED; ++r) memcpy(increments[phi_iterated[r]], now[r], sizeof z[0]);
 }
 
-/* Compute the changes, in a step, of the unknowns that are not iterated. Factors 1 - c_j of the increments make the step
-   symplectic. */
+/* Compute the changes of the unknowns that sweeps do not iterate, in a step. They depend on sums of (1 - c_j) times the
+   increment of stage j; these factors make the step symplectic. */
 static void phi_end_followers(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
     double reads[PHI_READS], offsets[PHI_FOLLOWERS], time[2] = { 1.0, s->h };

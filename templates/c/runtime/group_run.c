@@ -40,7 +40,7 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
     return status;
 }
 
-/* Integrate one group, from member first on. Returns the first status that is not OK. */
+/* Integrate one group, which begins with member number `first`. Returns the first status that is not OK. */
 static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;

@@ -87,7 +87,7 @@ static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[re
     }
 }
 
-/* Select the predictor of a stage that would have predicted its solutions y best. */
+/* For a stage with solutions y, select the predictor that would have predicted y best. */
 static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     phi_lanes row[PHI_HISTORY + 1][PHI_DIM];

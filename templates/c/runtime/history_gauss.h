@@ -2,19 +2,19 @@
 #define PHI_FILE_HISTORY_GAUSS_H
 #if PHI_LIFTED
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
-   only, but frame and frame_carry belong to the state. Unknowns are offsets from a state. */
+   only, except frame and frame_carry, which belong to the state. Unknowns are offsets from a state. */
 #else
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
-   only. Unknowns are offsets from a state, their frame. */
+   only. Unknowns are offsets from a state, which is called their frame. */
 #endif
 typedef struct {
-    int count;     /* number of steps in increments */
+    int count;     /* number of steps in the array increments */
 #if PHI_STAGED
-    int latest;    /* index of the last step in increments */
+    int latest;    /* index of the last step in the array increments */
 #endif
     int sweeps;    /* number of the first sweep whose change is measured */
 #if PHI_STAGED
-    int predictor; /* row of phi_prediction that predicts the next step */
+    int predictor; /* index in phi_prediction of the predictor for the next step */
     int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
 #endif
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */

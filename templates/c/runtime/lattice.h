@@ -23,24 +23,25 @@ phi_status phi_init_at(phi_solver *s, const phi_params *params, PHI_SIZES, const
    next, below 2^48) and site. phi_init sets seed, member and step to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
-/* Declare that this lattice is a part of a larger one with `planes` planes along the first axis, of which plane 0 here is
-   plane number `first`. Sites then have the random numbers that they have in the larger lattice. */
+/* Declare that this lattice is a part of a larger one with `planes` planes along the first axis, and that plane 0 of
+   this lattice is plane number `first` of the larger one. Sites then have the random numbers that they have in the
+   larger lattice. */
 phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
 
-/* Set the number of earlier steps of size h, for time and random numbers: after phi_init, to continue a run with the
-   same bits, and before each caller-driven step. */
+/* Set the number of earlier steps of size h, on which time and random numbers depend. Call it before each caller-driven
+   step, and after phi_init to continue a run with the same bits. */
 phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
 #if PHI_SERIES || PHI_NOISE
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
-   the successful ones. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 #elif PHI_CORRECTED
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
-   the successful ones. Each call begins and ends with the flows of the corrector. OpenMP updates rows in parallel, with
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. Each call begins and ends with the flows of the corrector. OpenMP updates rows in parallel, with
    the same bits for any number of threads. */
 #else
-/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
-   the successful ones. The last flow of a step is merged with the first of the next step or call. OpenMP updates rows in
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
+   s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or call. OpenMP updates rows in
    parallel, with the same bits for any number of threads. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
@@ -91,14 +92,14 @@ phi_status phi_kick(phi_solver *s, const double *change);
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. phi_saved writes *full_range, and arrays
-   x[array][site]; it returns the number of arrays, at most that of fields, or three times that with compensated steps. To
-   restore, call phi_init, then phi_resume with these values. */
+   x[array][site]; it returns the number of arrays: at most one for each field, or three with compensated steps. To
+   restore the run, call phi_init, then phi_resume with these values. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *full_range);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range);
 
 /* The physical time since phi_init, also s->t. Steps are equal in a time tau: h is a step in tau of the Hamiltonian K =
-   log(A + e) - log(-B), where H = A + B. K is 0 along the trajectory, since phi_init and changes of the state set e = -H;
-   they return PHI_BAD_ARGUMENT where -B is not positive. */
+   log(A + e) - log(-B), where H = A + B. K is 0 along the trajectory, since e = -H is set by phi_init and by changes of
+   the state. These functions return PHI_BAD_ARGUMENT where -B is not positive. */
 double phi_solver_time(const phi_solver *s);
 
 /* Save and restore the energy level e and the physical time; to restore a run, call phi_resume_clock after phi_resume. */

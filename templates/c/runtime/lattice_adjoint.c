@@ -90,7 +90,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #if PHI_RENEWED
         next = k - 1;
 #else
-        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* back to the last output row or start of a leg */
+        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* back to the last output row, or to the start of the leg */
         next = k - next > most ? k - most : next;
 #endif
         if (g->anew) {
@@ -233,7 +233,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 #if PHI_RECOMPUTED
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR
-    g.full_range = 1; /* there are no fast versions of functions, for small arguments only */
+    g.full_range = 1; /* no function has a fast version for small arguments */
 #endif
 #endif
     status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);

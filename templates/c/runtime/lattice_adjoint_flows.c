@@ -44,8 +44,8 @@ static int phi_part_of(const phi_solver *s, int sweep)
 #include "lattice_recomputed.c"
 #include "lattice_tape.c"
 
-/* Add the cotangent of an output row, the state after a number of steps. The cotangent is first pulled back through the
-   last flow, since the state of the reverse pass is that before it. */
+/* Add the cotangent of an output row: of the state after a number of steps. The state of the reverse pass is the state
+   before the last flow of these steps, so the cotangent is first pulled back through this flow. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
 {
     for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, g->row_bar[f], row_bar + f * s->sites);

@@ -9,8 +9,9 @@
 /* ---- Reverse pass of sweeps ---- */
 #include "lattice_shares.c"
 
-/* Copy segments of rows to the tape, with their halo. The halo of a single row is computed here, since another thread may be
-   writing it. Sums over pairs may read numbers after the last site, which they do not use; these become 0. */
+/* Copy segments of rows, with their halo, to the tape. If there is a single row, its halo is computed here, since
+   another thread may be writing it. Sums over pairs may read numbers after the last site, which they do not use; these
+   become 0. */
 static void phi_store_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
 #if PHI_ONE_ROW

@@ -78,8 +78,8 @@ static void phi_put_entry(const phi_matrix *m, ptrdiff_t i, ptrdiff_t j, double 
         m->d[(j - m->inner) * m->border + i - m->inner] = value;
 }
 
-/* Compute columns of the Newton matrix, by one product of the derivative of a sweep with a vector: those of field f at count
-   sites from `first` on, which are so far apart that their columns do not overlap. */
+/* Compute some columns of the Newton matrix, by one product of the derivative of a sweep with a vector. They belong to
+   field f at `count` sites from `first` on. The sites are so far apart that their columns do not overlap. */
 static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, int now, ptrdiff_t first, ptrdiff_t count, int f)
 {
     const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
@@ -172,8 +172,8 @@ static void phi_solve_back(const phi_matrix *m)
     phi_substitute_back(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
 }
 
-/* Make a Newton correction of s->y[now]: the change by a sweep, whose result is s->y[1 - now], gives the residual, and the
-   corrected value replaces this result. */
+/* Make a Newton correction of s->y[now]. s->y[1 - now] is the result of a sweep; its difference from s->y[now] is the
+   residual. Then the corrected y replaces this result. */
 static void phi_eliminate(phi_solver *s, int now)
 {
     phi_matrix m;

@@ -6,10 +6,10 @@
 #include "sweeps.h"
 
 /* ---- Relative coordinates of bodies ---- */
-/* Flows act on relative positions and velocities. In place of the first body they have the position and the velocity of
-   the centre of mass of all bodies. In Jacobi coordinates, the values of each later body are relative to the centre of
-   mass of all bodies before it. In democratic heliocentric coordinates, positions are relative to the first body, and
-   velocities to the centre of mass. */
+/* Flows act on relative positions and velocities. The values of the first body are replaced by those of the centre of
+   mass of all bodies. In Jacobi coordinates, the values of each later body are relative to the centre of mass of all
+   bodies before it. In democratic heliocentric coordinates, positions are relative to the first body, and velocities to
+   the centre of mass. */
 
 /* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative,
    their sum must be finite, and the masses of the first body and of bodies with momenta must be positive. */
@@ -71,8 +71,8 @@ static void phi_place_bodies(const phi_solver *s, double *const *x, double *cons
     }
 }
 
-/* Subtract from the acceleration of each body that of the centre of mass of all bodies before; accelerations are the sums
-   from index first on. */
+/* Make the acceleration of each body relative to the centre of mass of all bodies before it. Accelerations are stored
+   in the sums, from index `first` on. */
 static void phi_join_pulls(const phi_solver *s, int first)
 {
     const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];

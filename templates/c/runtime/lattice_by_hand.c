@@ -6,7 +6,8 @@
 #include "sweeps.h"
 
 /* ---- Caller-driven stepping ---- */
-/* Number of stages that callers can make: those of a step and, without noise, the last one merged with the first. */
+/* Number of stages that callers can make: the stages of a step and, without noise, its last stage merged with the first
+   one. */
 #if PHI_NOISE
 enum { PHI_NUMBERED = PHI_FLOWS };
 #else

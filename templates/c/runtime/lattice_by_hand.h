@@ -7,7 +7,7 @@
    completed the earlier stages. */
 typedef struct {
     size_t behind, ahead;        /* number of planes that are read before the first updated one, and after the last */
-    unsigned long read, changed; /* fields read there, and fields that are updated: bit k is 1 for field k */
+    unsigned long read, changed; /* fields read on these planes, and fields that are updated: bit k is 1 for field k */
 } phi_stage;
 
 size_t phi_stages(void);

@@ -15,8 +15,8 @@
    one. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
-/* Number of the row of coefficients for a flow of a step. For the first flow, if it is merged with the last flow of the
-   step before (continues = 1), it is PHI_FLOWS. */
+/* Number of the row of coefficients for a flow of a step. If continues = 1, the first flow is merged with the last flow
+   of the step before, and uses row PHI_FLOWS. */
 static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
 
 #endif
@@ -76,13 +76,13 @@ static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state
 }
 
 #if PHI_SERIES
-/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as possible with room for the
-   checkpoints of all segments, so that each step is made at most twice. If there is never room for them, tape and
-   checkpoints get one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as possible such that all
+   their checkpoints have room; each step is then made at most twice. If checkpoints of all segments never have room,
+   tape and checkpoints get one half each. */
 #else
-/* Divide the memory between the tape of one segment and checkpoints. The tape of a segment fills the cache. It is
-   longer if there is room for the checkpoints of all segments only then; each step is then made at most twice. If there
-   is never room for them, tape and checkpoints get one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. The tape of a segment fills the cache, or more if
+   the checkpoints of all segments would not have room otherwise; each step is then made at most twice. If they never
+   have room, tape and checkpoints get one half each. */
 #endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {

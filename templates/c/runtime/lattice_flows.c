@@ -13,7 +13,7 @@ enum { PHI_FULL_RANGE_STEPS = 64 }; /* number of steps with functions for argume
 
 #if PHI_SHARED
 #if PHI_BY_COLOUR
-/* Apply one flow, of a part of H or of its terms at sites of one colour; called by all threads together. */
+/* Apply the flow of a part of H, or the flow of its terms at sites of one colour; called by all threads together. */
 static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FULL_RANGE)
 #else
 /* Apply the flow of one part of H; called by all threads together. */
@@ -152,10 +152,10 @@ static int phi_close(phi_solver *s)
 }
 
 #if PHI_NOISE
-/* Make steps from the state in s->before, which s->x has too. Values are checked after several steps; if they are not
-   finite, these steps are repeated one by one. */
+/* Make steps from the state in s->before, which is also in s->x. Values are checked after several steps; if they are
+   not finite, these steps are repeated one by one. */
 #else
-/* Make steps from the state in s->before, which s->x has too. The last flow of the last step is not made. Values are
+/* Make steps from the state in s->before, which is also in s->x. The last flow of the last step is not made. Values are
    checked after several steps; if they are not finite, these steps are repeated one by one. */
 #endif
 static phi_status phi_march(phi_solver *s, size_t steps)

@@ -57,9 +57,9 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
 
 #include "lattice_site_blocks.c"
 
-/* Compute to = from - v, where v solves A v = s->space[0] with the matrix A of phi_multiply, by GMRES (Y. Saad and
-   M. H. Schultz) with PHI_DIRECTIONS directions, without restart. Returns the norm of s->space[0], or infinity if the
-   residual is too large for v to be useful. */
+/* Compute to = from - v, where v solves A v = s->space[0] and phi_multiply multiplies by A. The method is GMRES (Y.
+   Saad and M. H. Schultz) with PHI_DIRECTIONS directions, without restart. Returns the norm of s->space[0], or infinity
+   if the residual is too large for v to be useful. */
 static double phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)
 {
     double matrix[PHI_DIRECTIONS][PHI_DIRECTIONS], cosine[PHI_DIRECTIONS], sine[PHI_DIRECTIONS], side[PHI_DIRECTIONS + 1];

@@ -51,7 +51,7 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
     return phi_relaxed(s, NULL PHI_AND_FULL_RANGE(1), now);
 }
 
-/* Largest accepted distance of a solution from x: farther away, solutions are unrelated to the motion. */
+/* Largest accepted distance of a solution from x. Solutions farther away are unrelated to the motion. */
 static double phi_range(phi_solver *s, const double *coef)
 {
     phi_copy(s->y[0], s->x, s);

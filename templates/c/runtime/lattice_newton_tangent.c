@@ -5,9 +5,9 @@
 
 #include "lattice_tangent_policy.h"
 
-/* Multiply tangent vector `number` by the derivative of a stage with solution y = s->y[now]. The change dy of y solves dy =
-   S dy + side, where S is the derivative of a sweep by y and side its derivative along the vector; then the change of the
-   increment due to dy is added to the vector. */
+/* Multiply tangent vector `number` by the derivative of a stage with solution y = s->y[now]. The change dy of y solves
+   dy = S dy + side, where S is the derivative of a sweep by y, and side the derivative of a sweep along the vector.
+   Then the change of the increment due to dy is added to the vector. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
 {
     const size_t units = phi_units(s);

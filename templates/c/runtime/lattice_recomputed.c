@@ -51,8 +51,8 @@ static void phi_reverse_flows(const phi_solver *s, const phi_flow *flows, size_t
 enum { PHI_DEEPEST = 1 }; /* number of flows that are processed together */
 #endif
 
-/* Append the reverse pass of flow `number` of a step, for the cotangents bar, to a queue of *count flows. The queue is
-   processed when it holds `depth` flows. */
+/* Flow `number` of a step must be pulled back for the cotangents bar: append it to the queue, which has *count flows.
+   The queue is processed when it holds `depth` flows. */
 static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
     phi_flow *flows, size_t *count, size_t depth)
 {
@@ -170,8 +170,8 @@ static int phi_differ_by(const phi_solver *s, const double *one, const double *o
     return agree;
 }
 
-/* Set the state to that stored at the start of a leg, after all its steps have been recomputed; fails if the recomputed state
-   differs too much from it. */
+/* After all steps of a leg have been recomputed, return to the state that is stored at its start. Fails if the
+   recomputed state differs too much from the stored one. */
 static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t leg)
 {
     double *began[PHI_DIM], largest = 0.0;

@@ -3,6 +3,6 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Process the reverse pass of a flow for row segments. go = 1: pull cotangents back and invert the flow; go = 2: add the
-   contributions to the cotangents of other sites. */
+/* Make a part of the reverse pass of a flow, for row segments. go = 1: pull cotangents back and invert the flow. go =
+   2: add the contributions to the cotangents of other sites. */
 #endif

@@ -6,7 +6,7 @@
 
 /* ---- Seams ---- */
 /* Find where the boundary seam of each axis begins. A seam has the sites that remain after whole periods of colours. If
-   these are fewer than the smallest width of a seam, it has further periods too. */
+   these sites are too few for a seam, the seam also has the last whole periods. */
 static void phi_find_seams(phi_solver *s)
 {
     for (int a = 0; a < PHI_AXES; ++a) {

@@ -22,8 +22,8 @@ static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
     for (int k = 0; zero != 0.0 && k < PHI_DIM * PHI_DIM; ++k) b[k / PHI_DIM][k % PHI_DIM] = k % (PHI_DIM + 1) == 0;
 }
 
-/* Compute the preconditioner at s->y[now]: the inverse of the diagonal block of each site. Where fields of one site are
-   strongly coupled, like a momentum and its field, it halves the number of Krylov directions. */
+/* Compute the preconditioner at s->y[now]: the inverse of the diagonal block of each site. The preconditioner halves
+   the number of Krylov directions where fields of one site are strongly coupled, like a field and its momentum. */
 static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
 {
     const size_t units = phi_units(s);

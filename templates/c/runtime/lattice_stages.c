@@ -56,8 +56,8 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
 }
 
 /* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns the largest
-   change of a field relative to its size, not finite if y is not. In a reverse pass s->side is not NULL; y is then a
-   cotangent, and the sweep is side + (transposed derivative of a sweep at s->y[2]) y. */
+   change of a field relative to its size; the result is not finite if y is not. In a reverse pass s->side is not NULL;
+   y is then a cotangent, and the sweep is side + (transposed derivative of a sweep at s->y[2]) y. */
 #else
 /* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns the largest
    change of a field relative to its size, not finite if y is not. */

@@ -30,7 +30,7 @@ static double *phi_store_fields(const phi_solver *s, int sweep, double *to)
     return to;
 }
 
-/* Make at least one step, without the last flow of the last step, and write the tape to s->tape. */
+/* Make one step or more, and write the tape to s->tape. The last flow of the last step is left out. */
 static void phi_make_steps_with_tape(const phi_solver *s, size_t steps)
 {
     const size_t of_step = phi_step_tape_size(s);
@@ -71,8 +71,9 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
 #endif
 }
 
-/* Pull the cotangents bar back through a flow. Its fields on the tape end at `tape`, which may be NULL if there are none; x
-   becomes the fields before the flow. Returns where the fields of the flow begin on the tape. */
+/* Pull the cotangents bar back through a flow. The fields that the tape holds for this flow end at `tape`, which may be
+   NULL if there are none. x becomes the fields before the flow. Returns where the fields of the flow begin on the tape.
+   */
 static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
     double *tape, double **x, double *const *bar)
 {

@@ -10,7 +10,7 @@
    behind the flow before it, so that a slice is loaded once for all of them. Each thread has its own range of slices. At the
    ends of the range, flow k first leaves out k PHI_SPAN slices, which are updated when all threads have reached their ends.
    Each flow reads the same values as in separate passes, so the bits are the same. */
-enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* largest number of flows in a block; bytes of cache for their slices */
+enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* largest number of flows in a block; bytes of cache for the slices of all these flows */
 
 #if PHI_ONE_ROW
 /* Number of slices: the segments of the row. */

@@ -17,7 +17,7 @@ static int phi_time_passes(const phi_params *params, const double x[PHI_DIM])
     return isfinite(rate) && rate > 0.0;
 }
 
-/* Convert a vector field from dx/dt, with the physical time t, to dx/dtau. */
+/* Convert a vector field from dx/dt to dx/dtau, where t is the physical time. */
 static void phi_make_per_tau(const phi_params *params, const double x[PHI_DIM], double field[PHI_DIM])
 {
     const double rate = phi_monitor(params, x);

@@ -58,7 +58,7 @@ static size_t phi_to_frame(const phi_members *all, size_t done)
     return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
 }
 
-/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL: the member has failed. */
 static void phi_put_frame(const phi_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < PHI_DIM && all->frames != NULL && done % all->stride == 0; ++i)

@@ -14,7 +14,7 @@
 #include "measure_policy.h"
 #include "newton_policy.h"
 
-/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
+/* Largest relative component of the correction delta of y; NaN or infinite if a component is. */
 static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -29,7 +29,7 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The effect of the
    last correction on the increment is added to first order, without another evaluation. So iterations end if the next
-   correction, quadratic in the last, is expected below PHI_TOLERANCE. */
+   correction is expected to be below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];

@@ -20,8 +20,8 @@ typedef struct {
 
 #include "newton_stages.c"
 
-/* Compute the weights of corrections of y: 1 / (the smallest magnitude of a component of y in all stages), with a bound for
-   small components. So the accuracy of solutions is relative, as in single steps. */
+/* Compute the weight of each component of corrections of y: 1 / (the smallest magnitude of this component of y in all
+   stages), with a bound for small components. The accuracy of solutions is thus relative, as in single steps. */
 static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -41,7 +41,7 @@ static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes uni
     }
 }
 
-/* Subtract the correction delta from y; size receives the sum of the magnitudes of its components times their weights, unit. */
+/* Subtract the correction delta from y. size receives the weighted sum of |delta_i|, with the weights `unit`. */
 static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     memset(size, 0, PHI_LANES * sizeof size[0]);
@@ -59,15 +59,16 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #include "newton_corrected_sparse.c"
 #include "newton_corrected.c"
 
-/* Relative sizes of corrections. After one below PHI_FROZEN, the matrices are reused. After one below PHI_SMALL, whose square
-   is below rounding, a correction below PHI_BLOCK_ROUNDING is the last. */
+/* Relative sizes of corrections. After a correction below PHI_FROZEN, the matrices are reused. After a correction below
+   PHI_SMALL, its square is below rounding, and the next one is the last if it is below PHI_BLOCK_ROUNDING. */
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_BLOCK_ROUNDING 1e-10
 #define PHI_CAUTION 32.0 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 
-/* Estimate the size of the next correction: after the first correction its square; later `size`, the size of the last
-   correction, times the ratio size / before, with a safety margin. The estimate is 0 at rounding level. */
+/* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the one before.
+   The estimate is size^2 after the first correction, later size * size / before with a safety margin, and 0 at rounding
+   level. */
 static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)
 {
     PHI_EACH_LANE

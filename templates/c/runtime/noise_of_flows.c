@@ -2,7 +2,8 @@
 #define PHI_FILE_NOISE_OF_FLOWS
 #include "solver.h"
 
-/* If h < 0, exchange the increments of the first and the second half of the step, so that it inverts a step of size -h. */
+/* If h < 0, exchange the increments of the first and the second half of the step, so that the step inverts a step of
+   size -h. */
 static void phi_order_draws(phi_solver *s)
 {
     for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) {

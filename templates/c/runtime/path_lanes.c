@@ -32,8 +32,8 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     }
 }
 
-/* Compute alpha - y (displacement) and beta - alpha (increment) from the Taylor series of paths. The mean of a path differs
-   a little from y; results are corrected to first order in the difference. */
+/* Compute alpha - y (displacement) and beta - alpha (increment) from the Taylor series of paths. The mean of a path
+   differs a little from y; the results are corrected to first order in this difference. */
 static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wrong)
 {
     phi_lanes miss[PHI_DIM];

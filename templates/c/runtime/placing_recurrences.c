@@ -8,8 +8,8 @@
 
 #define PHI_NEAR_BY 0.125 /* largest relative change of the state after which predictors are shifted rather than cleared */
 
-/* After a change of the state, shift the past solutions that the extrapolation needs: past solutions of a motion
-   through the new x differ by the change of the state, and by the change of the vector field times the time since then.
+/* After a change of the state, shift the past solutions that the extrapolation needs: for a motion through the new x, a
+   past solution differs by the change of the state, minus the change of the vector field times the time since then.
    Recurrences are dropped, since they were fitted to the former motion. After a large change, the next step clears the
    predictors. */
 static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
@@ -42,7 +42,7 @@ static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
     for (int i = 0; i < PHI_DIM; ++i) slope[i] -= before[i];
 #endif
 #if PHI_COMPOSED
-    double since = s->h; /* time since the start of a stage of the last step, first of stage 0 */
+    double since = s->h; /* time since the start of a stage in the last step; at first of stage 0 */
 #endif
     PHI_EACH_STAGE {
         phi_history *history = &PHI_OF(s->history, stage);

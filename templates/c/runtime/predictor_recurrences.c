@@ -23,7 +23,8 @@ enum {
     PHI_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
-/* Predict the next solution from earlier ones. Returns 0 if none is known, or if the prediction is far from the last one. */
+/* Predict the next solution from earlier solutions. Returns 0 if no solution is known, or if the prediction is far from
+   the last solution. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     const int last = history->count - 1;
@@ -45,8 +46,8 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return last >= 0 && phi_near(value, history->past[last]);
 }
 
-/* After a step with several iterations, whose solution is `value`: select the predictor that would have predicted it
-   best. */
+/* After a step that took several iterations, select the predictor that would have predicted its solution `value` best.
+   */
 static void phi_judge(phi_history *history, const double value[PHI_DIM])
 {
     double row[PHI_HISTORY + 1][PHI_DIM], predicted[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;

@@ -40,7 +40,7 @@ static void phi_project(int rows, double (*one)[8], int column, double *inverse,
     }
 }
 
-/* Error of the recurrences for values that were not used in the fit, at the end of the array. */
+/* Largest error of the recurrences as predictions of the last values in the array, which were not used in the fit. */
 static double phi_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };

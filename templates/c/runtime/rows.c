@@ -6,7 +6,7 @@
 #include "model.h"
 
 /* ---- Rows of sites ---- */
-/* Segment of a row, with the pointers and numbers that loops over its sites read. */
+/* A segment of a row, with the pointers and numbers that a loop over the sites of the segment reads. */
 typedef struct {
 #include "state_of_row.h"
 } phi_row;

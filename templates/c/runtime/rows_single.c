@@ -13,7 +13,7 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     return 1;
 }
 
-/* The record of the whole row. */
+/* The whole row as one segment. */
 static inline phi_row phi_row_of(const phi_solver *s)
 {
     phi_row row;
@@ -27,7 +27,7 @@ enum { PHI_PIECE = 256 }; /* sites of a work item, for any number of threads */
 enum { PHI_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 #endif
 
-/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
+/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single segment. */
 static size_t phi_units(const phi_solver *s)
 {
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;

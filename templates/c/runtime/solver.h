@@ -82,7 +82,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 #if PHI_MONITOR
 /* The energy level e becomes -H of the present state with the new parameters. */
 #elif PHI_GAUGE
-/* The gauge, the factors of Casimirs in s->gauge, is unchanged. */
+/* The factors of Casimirs in s->gauge are unchanged. */
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
@@ -90,10 +90,10 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
    random increments. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
-/* States at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r * PHI_DIM + i]
-   is x_i at fraction[r]. They serve to find events, are far less accurate than steps, and lie off the symplectic leaf by
-   their error. For a state at an event with the accuracy of steps, make a step of size (fraction - 1) h with a copy of *s.
-   Returns PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
+/* States at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r * PHI_DIM +
+   i] is x_i at fraction[r]. These states serve to find events. They are far less accurate than steps, and lie off the
+   symplectic leaf by their error. For a state at an event with the accuracy of steps, make a step of size (fraction -
+   1) h with a copy of *s. Returns PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
 phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their last good
@@ -104,8 +104,8 @@ phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t c
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
-/* phi_ensemble with other random numbers: member m has those of `seed` and member number first_member + m, from the
-   step number first_step on. phi_ensemble takes 0 for seed, first_member and first_step. With OpenMP, members are
+/* As phi_ensemble, with a choice of random numbers: member m has those of `seed` and of member number first_member + m,
+   from step number first_step on. phi_ensemble takes 0 for seed, first_member and first_step. With OpenMP, members are
    integrated in parallel; the results do not depend on the number of threads. */
 phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);

@@ -11,8 +11,8 @@
 enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* number of derivatives of the vector field at a stage, by x and by the unknowns */
 #include "gauss_tangent_policy.h"
 
-/* Compute the derivatives of the stage increments by coordinate j at the start of the step. They solve linear equations, by
-   fixed-point sweeps. Returns 0 if the sweeps do not converge. */
+/* Compute the derivatives of the stage increments by coordinate j at the start of the step. The derivatives solve
+   linear equations, by fixed-point sweeps. Returns 0 if the sweeps do not converge. */
 static int phi_vary(const phi_solver *s, double slopes[PHI_NODES][PHI_SLOPES], int j, phi_lanes *varied)
 {
     phi_lanes z[PHI_UNKNOWNS];

@@ -10,7 +10,8 @@ static double phi_taylor_product(const double *a, const double *b, int k)
     return sum;
 }
 
-/* Coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; a and d have the coefficients of a and f'(a). */
+/* Coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'. The arrays a and d have the coefficients of a
+   and of f'(a). */
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;

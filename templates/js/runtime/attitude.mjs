@@ -24,7 +24,7 @@ export function turnBy({ turned, turnedCarry }, factor) {
   normalise(turned, turnedCarry);
 }
 
-/** Set the attitude at the present state of the solver to the group element first. */
+/** Make the group element `first` the attitude at the present state of the solver. */
 export function beginAttitude(solver, first) {
   solver.firstElement = Float64Array.from(first);
   solver.turned = identityElement();
@@ -39,7 +39,7 @@ export function currentElement(solver) {
   return element;
 }
 
-/** The group element of an attitude and, if the body has a position, of position. Throws StepError. */
+/** The group element that combines an attitude and, if the body has one, its position. Throws StepError. */
 export function elementOf(steps, attitude, position) {
   const elements = [...(attitude ?? identityElement().subarray(0, ATTITUDE))];
   addPosition(elements, position);

@@ -3,11 +3,11 @@ import { BODY_AXES, MASS, REMAINDER } from "./model.mjs";
 import { bodiesFrom, innerMasses, relativeFrom } from "./bodies_jacobi.mjs";
 
 // ---- Relative coordinates of bodies ---- Flows act on relative positions and velocities; the values of the
-// first body are those of the centre of mass of all bodies. In Jacobi coordinates, those of another body are
-// relative to the centre of mass of all bodies before it. In democratic heliocentric coordinates, positions
-// are relative to the first body, and velocities to the centre of mass of all bodies.
+// first body are those of the centre of mass of all bodies. In Jacobi coordinates, the values of any other
+// body are relative to the centre of mass of all bodies before it. In democratic heliocentric coordinates,
+// positions are relative to the first body, and velocities to the centre of mass of all bodies.
 
-/** Store the central masses of the Kepler motions, the total mass, and the last body with mass, in sites. */
+/** Store in sites: the central masses of the Kepler motions, the total mass, and the last body with mass. */
 export function weigh(sites) {
   const m = sites.params[MASS];
   sites.mass = m.reduce((sum, mass) => sum + mass, 0);
@@ -34,8 +34,8 @@ export function fieldOf(x, k, sites) {
 }
 
 /**
- * List, for the state of a solver and for each tangent vector, along each axis, the positions of all bodies
- * with their velocities or momenta.
+ * List the pairs [positions of all bodies, their velocities or momenta]: one pair for each axis of the state,
+ * then one for each axis of each tangent vector.
  */
 function axesOf({ x, vectors = [], sites }) {
   return [x, ...vectors].flatMap((y) => BODY_AXES.map((axis) => axis.map((k) => fieldOf(y, k, sites))));
@@ -67,9 +67,7 @@ export function multiplyByMass(v, sites) {
   for (let i = 0; i < v.length; i++) v[i] *= sites.params[MASS][i];
 }
 
-/**
- * Move the centre of mass at its constant velocity for a time, in the flow of the part of H that moves it.
- */
+/** Move the centre of mass at its constant velocity for a time, unless this part of H does not move it. */
 export function moveCentre(solver, part, time) {
   if (part === REMAINDER) return;
   for (const [q, v] of axesOf(solver)) q[0] += time * v[0];

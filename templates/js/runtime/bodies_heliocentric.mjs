@@ -38,7 +38,10 @@ export function bodiesFrom(q, v, sites) {
   v[0] -= recoil;
 }
 
-/** The state, or a tangent vector, in the form that sums over pairs of bodies read: unchanged. */
+/**
+ * Transform a state, or a tangent vector, for sums over pairs of bodies. In these coordinates, it is
+ * unchanged.
+ */
 export function placed(x) {
   return x;
 }

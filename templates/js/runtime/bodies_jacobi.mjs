@@ -31,7 +31,10 @@ export function bodiesFrom(q, v, sites) {
   }
 }
 
-/** The state, or a tangent vector, as sums over pairs of bodies read it: positions relative to the first. */
+/**
+ * Transform a state, or a tangent vector, for sums over pairs of bodies: positions relative to the first
+ * body.
+ */
 export function placed(x, sites) {
   const m = sites.params[MASS], from = x.slice();
   for (const [position] of BODY_AXES) {
@@ -48,8 +51,8 @@ export function placed(x, sites) {
 }
 
 /**
- * Subtract from the acceleration of each body, in the sums, that of the centre of mass of all bodies
- * before it.
+ * Make the acceleration of each body relative to the centre of mass of all bodies before it. Accelerations
+ * are in sites.sums.
  */
 export function joinSums(x, sites, first) {
   const m = sites.params[MASS];

@@ -12,7 +12,7 @@ const STATUS = {
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps number of successful steps before
+   * @param {number} steps number of successful steps before the failure
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -31,7 +31,7 @@ export function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
+/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
 export function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;

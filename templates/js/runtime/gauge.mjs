@@ -48,7 +48,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error at gauge[c] + t width, from its forward differences; it is a polynomial in gauge[c].
+ * Value of the error at gauge[c] + t width. The error is a polynomial in gauge[c], given by forward
+ * differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
@@ -89,8 +90,8 @@ function leastOnLine(params, gauge, c, width, samples) {
 
 /**
  * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c]
- * grad C_c; 0 where a result is not finite.
+ * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c] grad
+ * C_c. All factors are 0 if the error that they give is not finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

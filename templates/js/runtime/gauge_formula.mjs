@@ -3,8 +3,8 @@ import { GAUGE, products } from "./model.mjs";
 // ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
 
 /**
- * The gauge: for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 where it is not
- * finite.
+ * The gauge: for each Casimir C the factor c that minimises |grad H - c grad C| at x. A factor that is not
+ * finite becomes 0.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

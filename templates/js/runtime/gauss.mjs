@@ -21,7 +21,7 @@ export class History {
   /** Whether a step is stored, and whether the state was changed since that step. */
   stored = false;
   kicked = false;
-  /** Number of sweeps of the last step, and the factor by which the changes in a sweep shrink. */
+  /** Number of sweeps of the last step, and the factor by which changes shrink from sweep to sweep. */
   sweeps = 2;
   rate = 0.5;
   /** Stage increments of the last step, in the frame at its end; size of the last step. */
@@ -34,7 +34,8 @@ export class History {
   }
 
   /**
-   * Record that the state has changed: increments of the last step predict the next, but do not lead to x.
+   * Record that the state was changed. The increments of the last step still predict the next step, but no
+   * longer lead to x.
    */
   shift() {
     this.kicked = true;
@@ -54,10 +55,9 @@ export function forgetSteps(solver) {
 }
 
 /**
- * The factors f_j of the stage increments in the difference between the collocation polynomial at a
- * fraction of a step and its value at the end of the step. They are the integrals of the Lagrange
- * polynomials from 1 to the fraction, divided by the weights; they are computed by sums of Legendre
- * polynomials.
+ * The collocation polynomial at a fraction of a step, minus its value at the end, is the sum of f_j times
+ * increment j. Returns the factors f_j: the integrals of the Lagrange polynomials from 1 to the fraction,
+ * divided by the weights. They are computed by sums of Legendre polynomials.
  */
 export function factorsAt(fraction) {
   const x = 2 * fraction - 1;
@@ -131,15 +131,18 @@ function changeOf(start, before, after) {
   return Math.sqrt(largest);
 }
 
-/** Weights of the stage increments of a step in the unknowns at the stages of the next step of equal size. */
+/**
+ * The predicted unknowns at the stages of a step are sums of the stage increments of the last step, with
+ * these weights. The two steps have equal sizes.
+ */
 const PREDICTION = PLACES.map((place) => factorsAt(1 + place));
 
 const predicted = stages();
 const mixedIncrements = stages();
 
 /**
- * Solve the equations of a step for the stage increments, increments.now, by fixed-point sweeps from the
- * prediction; returns a status.
+ * Solve the equations of a step for the stage increments, by fixed-point sweeps from the prediction. The
+ * increments are stored in increments.now; returns a status.
  */
 export function collocate(solver, stage, start, history, increments) {
   let last = Infinity;

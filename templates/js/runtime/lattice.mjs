@@ -82,9 +82,9 @@ export class Solver {
   rows = emptyRows();
   /** Copy of the state before the present step, which is restored if the step fails. */
   before;
-  /** Predictors of steps of one size. */
+  /** Predictors of the stages; they are cleared when the step size changes. */
   past = {};
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 

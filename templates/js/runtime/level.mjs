@@ -24,7 +24,7 @@ export function expectPassingTime(solver) {
   throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
 }
 
-/** Convert a vector field at x from dx/dt, with the physical time t, to dx/dtau. */
+/** Convert a vector field at x from dx/dt to dx/dtau, where t is the physical time. */
 export function makePerTau(params, x, field) {
   const rate = rateAt(params, x);
   for (let i = 0; i < field.length; i++) field[i] *= rate;

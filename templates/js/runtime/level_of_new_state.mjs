@@ -3,8 +3,8 @@ import { chooseGauge, rateAt } from "./level.mjs";
 import { FRACTIONS, prepare } from "./model.mjs";
 
 /**
- * Set the energy level to that of a new state x. Throws StepError if it or the monitor is not
- * admissible at x.
+ * Set the energy level to -H at a new state x. Throws StepError if the level or the monitor is not admissible
+ * at x.
  */
 export function takeLevel(solver, x) {
   const [rate, level] = [rateAt(solver.params, x), chooseGauge(solver.params, x)];

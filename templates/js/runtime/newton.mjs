@@ -36,10 +36,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance;
- * returns a status. The effect of the last correction on the increment is added to first order, without
- * another evaluation. So iterations end when the next correction, of the order of the square of the last
- * one, is expected to be below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
+ * the square of the last one.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;

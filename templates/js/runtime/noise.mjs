@@ -17,7 +17,7 @@ function normals(seed, member, step, values) {
 /**
  * Set the increments of the noise in the next step: to `increments`, or if this is undefined, to random ones.
  *
- * @returns {boolean} false if one is not finite, or some are missing
+ * @returns {boolean} false if an increment is not finite or missing
  */
 function draw(solver, increments) {
   const { dw, seed, member, step0, steps, h } = solver;

@@ -70,7 +70,8 @@ const local = new Float64Array(DIM);
 
 /**
  * Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
- * its end minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
+ * the end of the path minus x, mean is the mean of the path minus x. For any p, the end of the path lies on
+ * the symplectic leaf of x.
  *
  * @returns {{good: boolean, piecesUsed: number}} good: whether the path is short enough and in the domain;
  *     piecesUsed: number of pieces computed
@@ -101,7 +102,7 @@ const mean = new Float64Array(DIM);
 
 /**
  * Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
- * change of x along the path and an approximate Jacobian of the residual. Returns the value of `followPath`.
+ * change of x along the path and an approximate Jacobian of the residual. Returns what `followPath` returns.
  */
 function findResidual(solver, coef, p, y, residual, change, jacobian) {
   const path = followPath(coef, solver.x, p, change, mean);

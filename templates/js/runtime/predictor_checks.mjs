@@ -25,7 +25,7 @@ export class History {
   }
 
   /**
-   * Add the change of the state, to - from, to the last solution; differences are unchanged.
+   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to

@@ -2,7 +2,7 @@ import { StepError } from "./errors.mjs";
 import { NEGATIVE, part1, part2 } from "./model.mjs";
 import { sumOf } from "./sites.mjs";
 
-// ---- Steps equal in a time tau: those of K = log(A + e) - log(-B), where H = A + B ----
+// ---- Steps equal in a time tau, for K = log(A + e) - log(-B) in place of H = A + B ----
 
 /** The sum over all sites of the values that the function density computes. */
 export function totalOf(density, params, sites, ...at) {

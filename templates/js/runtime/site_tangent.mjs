@@ -8,8 +8,8 @@ import { usual } from "./sweeps.mjs";
 
 /**
  * Multiply a tangent vector v by the derivative of a stage with solution y, in place. The change dy of y
- * solves dy = S dy + side, where S is the derivative of a sweep by y and side its derivative along v; then
- * the change of the increment due to dy is added to v. Returns false on failure.
+ * solves dy = S dy + side, where S is the derivative of a sweep by y, and side the derivative of a sweep
+ * along v. Then the change of the increment due to dy is added to v. Returns false on failure.
  */
 export function carry(coef, x, y, v, sites) {
   const sizes = usual(y);

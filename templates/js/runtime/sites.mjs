@@ -54,7 +54,7 @@ export class Sites {
     });
     // #if SEAMS
     this.#colours = colours;
-    /** Along each axis the first site of the boundary seam; the size where there is none. */
+    /** Along each axis the first site of the boundary seam; without a seam, the number of sites. */
     this.seams = SEAMS.map(([period, wide], axis) => {
       const left = sizes[axis] % period;
       return sizes[axis] - (left && left + Math.max(0, Math.ceil((wide - left) / period)) * period);
@@ -64,7 +64,10 @@ export class Sites {
       return at < near || at >= this.seams[axis] - near;
     }));
     const listed = (wanted) => Int32Array.from(beside.flatMap((own, i) => (wanted(own, i) ? [i] : [])));
-    /** The sites in boundary seams or near them; and the other sites: a list for each colour, and all. */
+    /**
+     * `beside` lists the sites in boundary seams or near them. `inside` lists all other sites: by colour, and
+     * all.
+     */
     this.beside = listed((own) => own);
     this.inside = this.coloured.map((_, colour) => listed((own, i) => !own && colours[i] === colour));
     this.inside.all = listed((own) => !own);
@@ -169,8 +172,9 @@ export class Sites {
   #begins = new Map();
 
   /**
-   * An array with 1 at sites whose neighbour at an offset has a colour and lies in exactly the boundary seams
-   * whose bits are set in window, else 0. WANTED[number] is the pair of colour and offset.
+   * An array that is 1 at some sites, else 0. WANTED[number] is a pair of a colour and an offset. A site has
+   * 1 if its neighbour at the offset has the colour, and lies in exactly those boundary seams whose bits are
+   * set in window.
    */
   begins(number, window) {
     const key = `${number} ${window}`;

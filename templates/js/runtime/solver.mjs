@@ -28,8 +28,8 @@ const number = new Float64Array(1);
 // #state names
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and the coefficients of a very small step are finite.
+ * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
+ * where required, and unless the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -61,7 +61,7 @@ export class Solver {
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   // #state fields
-  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
+  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 

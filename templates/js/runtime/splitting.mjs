@@ -7,7 +7,10 @@ import { DIM, FLOWS, SCHEDULE } from "./model.mjs";
 
 const at = new Float64Array(DIM);
 const displacement = new Float64Array(DIM);
-/** Results of a flow: increments of the coordinates, of the time, and a sum that is NaN outside a domain. */
+/**
+ * Results of a flow: increments of the coordinates and of the time, and a sum that is NaN if a logarithm
+ * fails.
+ */
 const change = new Float64Array(DIM + 2);
 
 /** Make flows, by default those of one step; returns a status. If it fails, the state is unchanged. */

@@ -58,7 +58,10 @@ function bySweeps(coef, x, prediction, sites) {
   return null;
 }
 
-/** Update backward differences with a new value; returns how many of them to sum for the next prediction. */
+/**
+ * Update backward differences with a new value. Returns how many of them should be summed for the next
+ * prediction.
+ */
 function remember(differences, value) {
   let order = 1;
   let least = Infinity;

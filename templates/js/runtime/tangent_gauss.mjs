@@ -10,7 +10,7 @@ const WIDE = DIM + UNKNOWNS;
 
 /**
  * The derivatives of the stage increments by coordinate j at the start of the step. They solve linear
- * equations, by fixed-point sweeps; null if the sweeps do not converge.
+ * equations, by fixed-point sweeps. The result is null if the sweeps do not converge.
  */
 function variedAlong(solver, slopes, j) {
   const [z, increments] = [stages(), stages()];

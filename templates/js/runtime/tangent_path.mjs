@@ -20,8 +20,8 @@ function tangentHolds(coef, p, f, m, slope) {
 }
 
 /**
- * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change is the end
- * minus the start, mean the mean minus the start.
+ * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change receives the
+ * end minus the start, mean the mean minus the start.
  *
  * @returns {boolean} false if TERMS terms do not suffice
  */
@@ -57,8 +57,8 @@ function varyPiece(coef, p, start, change, mean) {
 }
 
 /**
- * The end (change) and the mean of the whole path from x with covector p, minus x; each followed by its
- * variation under a variation of x[seed], or of p[seed - DIM] if seed >= DIM.
+ * The end (change) and the mean of the whole path from x with covector p, both minus x. Each is followed by
+ * its variation under a variation of x[seed], or of p[seed - DIM] if seed >= DIM.
  *
  * @returns {{change: Float64Array, mean: Float64Array} | null} null if the path cannot be followed
  */

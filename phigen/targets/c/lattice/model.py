@@ -34,7 +34,7 @@ def declarations(program: Program, step: Sweeps) -> str:
     arrays = len(layout.lattice.arrays)
     sizes = [
         ("ARRAYS", arrays, f"arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}"),
-        ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that are functions of params and h"),
+        ("COEFFICIENTS", max(1, step.row * rows_of(step)), "number of coefficients: functions of params and h"),
     ]
     if step.equation:
         stages, has = len(program.fractions), switches(layout)
@@ -203,7 +203,11 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     yield "ROW", max(1, step.row), "coefficients of one flow"
     yield "ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"
     if step.refresh:
-        yield "PREPARED", step.prepared, "coefficients of a row before those that depend on the time"
+        yield (
+            "PREPARED",
+            step.prepared,
+            "number of coefficients in a row that do not depend on the time; they come first",
+        )
     if program.noise:
         sources = program.noise.sources
         yield "SOURCES", len(sources), f"sources of noise at a site: {', '.join(sources)}"
@@ -217,14 +221,18 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         )
         yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
-            yield "REACH", reach(step), "sites on each side on which y at a site depends"
+            yield "REACH", reach(step), "y at a site depends on so many sites on each side"
             yield "BAND", band(step), "off-diagonals on each side in the matrix of Newton's method"
     else:
         yield "FLOWS", len(step.schedule.flows), "flows in a step"
     if step.corrected:
-        yield "FLOWS_BEFORE", len(step.schedule.begin), "flows before a run; those after a run come last"
+        yield (
+            "FLOWS_BEFORE",
+            len(step.schedule.begin),
+            "number of flows before a run; flows after a run come last in the tables",
+        )
     if step.rates:
-        yield "NEGATIVE", 1 + step.rates.negative, "the part B of H, which is negative"
+        yield "NEGATIVE", 1 + step.rates.negative, "number of the part B of H, which is negative, counted from 1"
     if step.relative:
         bodies = step.relative
         yield "BODY_AXES", len(bodies.axes), "axes along which bodies have a position and a velocity or momentum"
@@ -234,7 +242,11 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
             layout.lattice.arrays.index(sites.derived[0]),
             "index of the array of central masses of the orbits",
         )
-        yield "REMAINDER", 1 + bodies.remainder, "the part of H besides the Kepler motions"
+        yield (
+            "REMAINDER",
+            1 + bodies.remainder,
+            "number of the part of H that remains beside the Kepler motions, counted from 1",
+        )
     if has["WAVES"]:
         distances = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *distances) if several else 1

@@ -158,7 +158,7 @@ class _PartLoops:
             cases.append(row_drivers.in_forms(blocks))
         if step.relative:
             yield self._gathering(step.relative.remainder, threads)
-        title = "a flow" if coloured else "the flow of a part of H"
+        title = "a flow of the step, chosen by its number" if coloured else "the flow of a part of H"
         title = f"Derivative of {title} along a tangent vector" if self.varied else title[0].upper() + title[1:]
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
