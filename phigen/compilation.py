@@ -142,7 +142,15 @@ class _Compiled(ABC):
     def notes(self) -> list[str]:
         """Choices of the compiler that the user may not expect, each as a line of text."""
         choice_note = f"scheme: auto chose {self.choice}" if self.choice else ""
-        return [*filter(None, [choice_note, self.order.note])]
+        return [*filter(None, [choice_note, self.order.note]), *map(self._note_on_unused, self.unused)]
+
+    @property
+    def unused(self) -> list[str]:
+        """Keys of the spec that have no effect. They apply to the scheme of the spec, which an option replaced."""
+        return []
+
+    def _note_on_unused(self, key: str) -> str:
+        return f"{key} has no effect: it applies to another scheme than {self.scheme_name}"
 
     @property
     def monitor(self) -> Expression | None:
@@ -383,6 +391,11 @@ class CompiledSplitting(_CompiledSystem):
         """True: a step is composed of flows."""
         return True
 
+    @property
+    def unused(self) -> list[str]:
+        """Keys of the spec that have no effect, such as a tolerance: flows are exact."""
+        return [*self.spec.series_settings, *(f"solver: {key}" for key in self.spec.solve_settings)]
+
     def by_splitting(self) -> CompiledSplitting:
         """Return this compilation, since its scheme is a splitting."""
         return self
@@ -428,6 +441,11 @@ class CompiledGauss(_CompiledSystem):
         O(h^(d+1)).
         """
         return self.order.order
+
+    @property
+    def unused(self) -> list[str]:
+        """Keys of the spec that have no effect, such as ``terms``: Gauss methods have no series."""
+        return self.spec.series_settings
 
     @property
     def notes(self) -> list[str]:

@@ -281,16 +281,9 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
 
 def _candidates(spec: Spec) -> tuple[str, ...]:
     """Return the names of the schemes that offer all options of the spec, as candidates for ``scheme: auto``."""
-    names_options = spec.birealisation.kind != "auto" or spec.terms is not None
-    if names_options or spec.extras.modified_hamiltonian > 0:
+    if spec.series_settings:
         return ("series",)
-    return ("gauss", "series") if _settings_of_the_solve(spec) else ("splitting", "gauss", "series")
-
-
-def _settings_of_the_solve(spec: Spec) -> list[str]:
-    """Return the keys by which the spec controls the solution of implicit steps: ``tolerance``, ``max_iterations``."""
-    chosen = [key for key in ("tolerance", "max_iterations") if ("solver", key) in spec.locations]
-    return [key for key in chosen if key != "tolerance" or spec.solver.tolerance is not None]
+    return ("gauss", "series") if spec.solve_settings else ("splitting", "gauss", "series")
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
@@ -433,8 +426,7 @@ def _expect_no_settings_of_the_solve(spec: Spec) -> None:
     """Raise `SpecError` if the spec sets a tolerance or a number of iterations, which lattices do not offer."""
     message = "not for lattices, whose steps are exact flows, or are solved to round-off"
     diagnostics = [
-        spec.diagnostic(("solver", key), f"solver: {key} is {message}", f"remove {key}")
-        for key in _settings_of_the_solve(spec)
+        spec.diagnostic(("solver", key), f"solver: {key} is {message}", f"remove {key}") for key in spec.solve_settings
     ]
     if diagnostics:
         raise SpecError(diagnostics)

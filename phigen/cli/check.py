@@ -11,6 +11,7 @@ import click
 from phigen.cli.arguments import ORDER, many_specs, order_option, scheme_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
+from phigen.cli.generation import expect_target
 from phigen.cli.sources import load_all
 from phigen.errors import CheckError, Diagnostic, SpecError
 
@@ -177,14 +178,11 @@ def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
     """Collect an error for each target of the spec that cannot generate code for the system."""
-    from phigen import registry
-
     for name in spec.targets:
         try:
-            registry.find(name).expect_offered(compilation.program)
+            expect_target(compilation, name)
         except SpecError as error:
-            hints = [spec.diagnostic(("targets",), d.message, d.hint) for d in error.diagnostics]
-            collector.errors.append(SpecError(hints))
+            collector.errors.append(error)
 
 
 def _print(examination: Examination, console: Console) -> None:

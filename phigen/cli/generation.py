@@ -177,8 +177,22 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
         # bindings.
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
+    expect_target(compilation, target)
     _expect_steps(compilation, target)
     return emit(compilation.program, target, " ".join(arguments), single_file=single)
+
+
+def expect_target(compilation: Compilation, target: str) -> None:
+    """Raise `SpecError` if the target cannot express the program. The error has the place of the key ``targets``, if
+    the spec names the target there.
+    """
+    spec = compilation.spec
+    try:
+        TARGETS[target].expect_offered(compilation.program)
+    except SpecError as error:
+        if target not in spec.targets or ("targets",) not in spec.locations:
+            raise
+        raise SpecError([spec.diagnostic(("targets",), d.message, d.hint) for d in error.diagnostics]) from error
 
 
 def _expect_steps(compilation: Compilation, target: str) -> None:

@@ -522,6 +522,22 @@ class Spec:
         return tuple(name for name in self.observables if lattice is None or name in lattice.reductions)
 
     @property
+    def solve_settings(self) -> list[str]:
+        """The keys of ``solver`` by which the spec controls the solution of implicit steps."""
+        stated = [key for key in ("tolerance", "max_iterations") if ("solver", key) in self.locations]
+        return [key for key in stated if key != "tolerance" or self.solver.tolerance is not None]
+
+    @property
+    def series_settings(self) -> list[str]:
+        """The keys of the spec that apply to ``scheme: series`` only."""
+        stated = {
+            "terms": self.terms is not None,
+            "birealisation": self.birealisation.kind != "auto",
+            "modified_hamiltonian": self.extras.modified_hamiltonian > 0,
+        }
+        return [key for key, is_stated in stated.items() if is_stated]
+
+    @property
     def dimension(self) -> int:
         """Number of coordinates."""
         return len(self.coordinates)

@@ -4,9 +4,10 @@ import pytest
 from support import compile_text
 
 from phigen.compilation import Compilation
-from phigen.compiler import SCHEME_COMPILERS
+from phigen.compiler import SCHEME_COMPILERS, compile_spec
 from phigen.errors import SpecError
 from phigen.scheme.program import Program
+from phigen.spec import loads
 from phigen.spec.names import SCHEMES
 from phigen.spec.validate import WITHOUT_SERIES
 
@@ -106,3 +107,23 @@ def test_a_lattice_is_compiled_by_the_scheme_that_it_names_or_refused(scheme):
         assert f"scheme {scheme}: not for lattices" in compilation
     else:
         assert compilation.scheme_name == scheme
+
+
+def test_keys_that_a_replaced_scheme_does_not_use_are_noted():
+    """An option that replaces the scheme of the spec leaves keys of the former scheme without effect, which the notes
+    say.
+    """
+    text = (
+        "phigen: 1\nname: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+        "hamiltonian: p**2/2 - cos(q)\n"
+        "order: 2\nbirealisation: canonical-euler\n"
+    )
+    tolerance = "solver: {tolerance: 1.0e-9}\n"
+    assert compile_spec(loads(text + tolerance)).notes == []
+    assert compile_spec(loads(text), scheme="gauss").notes == [
+        "birealisation has no effect: it applies to another scheme than gauss"
+    ]
+    assert compile_spec(loads(text + tolerance), scheme="splitting").notes == [
+        "birealisation has no effect: it applies to another scheme than splitting",
+        "solver: tolerance has no effect: it applies to another scheme than splitting",
+    ]
