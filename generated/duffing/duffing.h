@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1c88b55f0c67d8c3b15fcecf50bedf54b5cc2fa60f6fffe2a70e616f707493e2
+ * body-sha256: c2f35e44b096bb247cf222da3e7676240f42a0a71a234d630e63d62346466d80
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -15,7 +15,7 @@ extern "C" {
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 enum { duffing_COEFFICIENTS = 33 }; /* number of coefficients: functions of params and h, and of the time */
-enum { duffing_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
+enum { duffing_DIFFERENCES = 9 };   /* differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double A;     /* amplitude of the drive */
@@ -38,7 +38,7 @@ typedef struct {
     double difference[duffing_DIFFERENCES][duffing_DIM]; /* the last solution, then its differences */
 } duffing_history;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[duffing_DIM];     /* the state; change it only by the functions below */
     double carry[duffing_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -7,14 +7,14 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ddcd3f927e1b5ba5ffcd3819bd3d53db3f3e439645dc3804ff4607ac58c38438
+ * body-sha256: c8bf66f272ca8e3152c2e720767aef40f3866a17b0a5e1f6e924ad2464a39bf9
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
  * const solver = new Solver({ x0: [...], t0, params: { ... } });
  * solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()
  *
- * Contents: the system, with its kernels; the class Solver; the step, by Newton's method.
+ * Contents: the system and its formulas; the class Solver; the step, by Newton's method.
  */
 
 // ---- The system ----

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3dc1c248523edbff2073375f2dee13972aed98aa5afe99ba4b9aabae0f6f2a2d
+# body-sha256: 3c2abbf586afaf10544cc6a33baa989159d602f3f27d77b5aaf4a849f45c0924
 import numpy as np
 
 VERSION = "0.1.0"
@@ -94,7 +94,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -315,7 +315,7 @@ MIDDLES = (0.5,)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for each stage of a step its coefficients, the parameters, the size of the stage, and its entry of
+    """Return the data of each stage of a step: coefficients, the parameters, the size of the stage, its entry of
     MIDDLES.
 
     The coefficients are those that do not depend on the time. They form an array (coefficients, members), or
@@ -379,10 +379,11 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h, t0 and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. t0 is the time of x0. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h, t0 and parameters
+    may be arrays with one number for each member. t0 is the time of x0.
+    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     if not np.isfinite(t0).all():

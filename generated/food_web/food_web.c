@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 9b5beb4c1c73ef5be5be9df43a7430fb7ca2f1b730dab98131ed9337528c1006
+ * body-sha256: 6fb58035eb6f3ebf07b078e9d01b8435c08426ddda798e74118da4db1722942f
  */
 #include "food_web.h"
 #include <limits.h>
@@ -23,10 +23,10 @@
 /* ---- The model ---- */
 const food_web_params food_web_default_params = { NULL, NULL };
 
-enum { food_web_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
-enum { food_web_ROW = 1 };            /* coefficients of one flow */
-enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { food_web_FLOWS = 25 };         /* flows in a step */
+enum { food_web_RESERVED = 4 };       /* number of arrays over the sites in the memory of a solver */
+enum { food_web_ROW = 1 };            /* number of coefficients of one flow */
+enum { food_web_ROWS_OF_FLOWS = 26 }; /* number of rows of coefficients */
+enum { food_web_FLOWS = 25 };         /* number of flows in a step */
 
 /* Along each axis: the smallest number of sites. */
 static const size_t food_web_least[food_web_AXES] = { 1 };

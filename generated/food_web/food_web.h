@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4d254ea7969bf4193ea09255a57072949ba34a46879dc0be789cb25c31a5bbc5
+ * body-sha256: 5498ccf3d879e92657904ec0d9ffd05843c52b234fb9839492efa26babafbf9d
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -23,10 +23,10 @@ typedef struct {
 
 extern const food_web_params food_web_default_params;
 
-enum { food_web_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
+enum { food_web_ARRAYS = 2 };        /* number of arrays over the sites: fields, then parameters */
 enum { food_web_COEFFICIENTS = 26 }; /* number of coefficients: functions of params and h */
-enum { food_web_GATHERED = 1 };      /* sums over bonds or pairs, stored for each site */
-enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
+enum { food_web_GATHERED = 1 };      /* number of sums over bonds or pairs that are stored for each site */
+enum { food_web_BOND_ARRAYS = 1 };   /* number of parameters at bonds */
 
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
@@ -37,8 +37,8 @@ typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[food_web_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
+    double *x[food_web_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[food_web_DIM]; /* copies of the fields, which replace them if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* indices in `other` of the first bond that starts, and ends, at each site */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 30c07d2b3db61a606e21475cee4ddaeb10855adcacb0b971df3853116fa57066
+ * body-sha256: 997c61efe9ba3d0bcb4623cb8c9f963c74d3edf3ca33d5a473aa763d15e8fd8d
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -646,7 +646,7 @@ static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int 
     return guiding_centre_attempt(s, stage);
 }
 
-/* Make the stages of one step. If one fails, the state is that before the step. */
+/* Make the stages of one step. If a stage fails, the state before the step is kept. */
 static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 {
     guiding_centre_status status = guiding_centre_OK;

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 72e21122cb469f6163deb810d959b39405b6e4ea8ace5a9cba6cc1cd6f7c7d43
+ * body-sha256: 3f5a502e3382713a3305e8417fba0b2826a52bf3352a5650b2e937dcc0895637
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -14,9 +14,9 @@ extern "C" {
 #define guiding_centre_CASIMIRS 0 /* Casimirs: none */
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
-enum { guiding_centre_STAGES = 5 };       /* stages of a step */
+enum { guiding_centre_STAGES = 5 };       /* number of stages of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
-enum { guiding_centre_DIFFERENCES = 9 };  /* past differences in the predictor; more would amplify rounding */
+enum { guiding_centre_DIFFERENCES = 9 };  /* differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */
@@ -41,7 +41,7 @@ typedef struct {
     double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
 } guiding_centre_history;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[guiding_centre_DIM];     /* the state; change it only by the functions below */
     double carry[guiding_centre_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 32370bfb4b29a3e6783aa8d793b70e42b2f061d3d74fce16d8c1ac6fa4541748
+# body-sha256: 93924481a81392b792d4d8f8d6975d8f9db3ec5c90f80fc5ed3de510ac4765ea
 import numpy as np
 
 VERSION = "0.1.0"
@@ -96,7 +96,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -192,8 +192,8 @@ CONTRACTING = 0.05  # a Jacobian is useful if an iteration multiplies the residu
 
 
 def _holds(coef, p, m, slope):
-    """Return for which members the slope of the Taylor series of a path at the point m is pi(m) p, as its equation
-    says.
+    """Return for which members the Taylor series of a path satisfies dm/dt = pi(m) p at the point m, with dm/dt =
+    slope.
 
     A series for which this fails only seems to have converged: it has gaps between its terms, as t + t**9, or extends
     across the kink of an absolute value.
@@ -565,7 +565,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
+    """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
     (coefficients, 1) if all members have the same coefficients.
@@ -616,10 +616,11 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    may be arrays with one number for each member.
+    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: a3cb6ea707cf1354a1975809c3907e45d9fa316a5bd88b49e908be7babc96f13
+ * body-sha256: f2b1d9dfcc74e1bcdfb682359b0b74ab3ff8afff4266ac56c38467262c2ecb2f
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -23,20 +23,22 @@
 /* ---- The model ---- */
 const heisenberg_params heisenberg_default_params = { 1.0, NULL };
 
-enum { heisenberg_HALO = 1 }; /* sites that are copied beyond each end of a row */
-enum { heisenberg_LEAD = 8 }; /* doubles before the first site of a row */
-enum { heisenberg_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
-enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and its neighbours */
-enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
-enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
-enum { heisenberg_FLOWS = 5 }; /* flows in a step */
+enum { heisenberg_HALO = 1 };     /* number of sites that are copied beyond each end of a row */
+enum { heisenberg_LEAD = 8 };     /* number of doubles before the first site of a row */
+enum { heisenberg_RESERVED = 7 }; /* number of arrays over the sites in the memory of a solver */
+/* number of rows that loops over a row read: the row itself and its neighbours */
+enum { heisenberg_LINES = 5 };
+enum { heisenberg_ROW = 3 }; /* number of coefficients of one flow */
+enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* number of rows of coefficients */
+enum { heisenberg_FLOWS = 5 }; /* number of flows in a step */
 enum { heisenberg_SPAN = 1 }; /* slices that a flow reads on each side of a slice, for wavefront blocking */
 
 /* Along each axis: the smallest number of sites, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
 static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 
-/* Rows of sites that kernels read, by their offsets from the updated row along all axes but the last. */
+/* Rows of sites that the update of a row reads, by their offsets from this row along all axes but the
+   last. */
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 

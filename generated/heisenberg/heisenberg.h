@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dafe7e6f6d4a6d96e1c57d112241cf0ebc849d141eb2150092bd37bb2a381931
+ * body-sha256: 9a8b4cb854094d8f25d917f670eb1abfcc3a7fd97a6157cfad2391218d64626e
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -23,7 +23,7 @@ typedef struct {
 
 extern const heisenberg_params heisenberg_default_params;
 
-enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
+enum { heisenberg_ARRAYS = 4 };        /* number of arrays over the sites: fields, then parameters */
 enum { heisenberg_COEFFICIENTS = 18 }; /* number of coefficients: functions of params and h */
 
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
@@ -35,8 +35,8 @@ typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[heisenberg_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
+    double *x[heisenberg_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[heisenberg_DIM]; /* copies of the fields, which replace them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
@@ -75,9 +75,9 @@ void heisenberg_state(const heisenberg_solver *s, double *x);
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
-/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its
-   arrays means defaults. Returns heisenberg_BAD_ARGUMENT for parameters that heisenberg_init refuses, and
-   then changes nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL for one
+   of its arrays means the default values. Returns heisenberg_BAD_ARGUMENT for parameters that heisenberg_init
+   refuses, and then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range,
@@ -111,8 +111,9 @@ size_t heisenberg_stages(void);
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
 /* heisenberg_begin computes the coefficients for a step size; call it before the first stage.
-   heisenberg_sweep makes a stage for the planes from ... to - 1. With full_range = 1 it uses functions for
-   arguments of any size; with full_range = 0 faster ones, which give NaN if an argument is too large. */
+   heisenberg_sweep makes a stage for the planes from ... to - 1. With full_range = 1, it uses functions for
+   arguments of any size; with full_range = 0, it uses faster functions, which give NaN if an argument is too
+   large. */
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int full_range, size_t from,
     size_t to);

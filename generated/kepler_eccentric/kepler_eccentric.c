@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 8f20db378754c701e45a44b896f1e27c1b113860d44ae2fcd519f070f926225d
+ * body-sha256: e9dd36edcb4e3f373f5d4ff9af7685b6da0ccaedd80106bc3f2d1b1151ab0b59
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -20,8 +20,9 @@
 /* ---- The model ---- */
 const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 
-enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* rows of coefficients, one for each duration of a flow */
-enum { kepler_eccentric_ROW = 4 };            /* coefficients in a row */
+/* number of rows of coefficients, one for each duration of a flow */
+enum { kepler_eccentric_ROWS_OF_FLOWS = 35 };
+enum { kepler_eccentric_ROW = 4 }; /* number of coefficients in a row */
 
 /* Durations of the flows of a step, as fractions of h: one for each row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 698b1de666ecb51edd4a5ba24a032da08b3ce1516cc80dc79fcedb16d6250b8a
+ * body-sha256: ada9ae27fef7ab0fba1992067455eaf51b3a400229ae13cbc0668596b8fcfeed
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -34,7 +34,7 @@ typedef enum { kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_
     kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT } kepler_eccentric_status;
 const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* the meaning of a status */
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[kepler_eccentric_DIM];     /* the state; change it only by the functions below */
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0529ce0470a44d6111255d6a966b3cd723e98f05a3cbddaf24878eff1e5964d3
+# body-sha256: c13e6da8fef7769a842d4f279b8570acbcd5ead6933c9d082d175606d3ffe45b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -95,7 +95,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -209,7 +209,7 @@ def _refused(parameters, x):
 
 
 def _time_of(stage, x, value):
-    """Return the physical time (members,) that passes in a stage with start x and solution value.
+    """Return the physical time (members,) that passes in a stage from x with the solution `value`.
 
     The time is NaN unless it has the sign of the step.
     """
@@ -218,7 +218,7 @@ def _time_of(stage, x, value):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
+    """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
     (coefficients, 1) if all members have the same coefficients.
@@ -269,12 +269,13 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...).
+    Steps have size h in the time tau. With times=True, the result is a pair: the states, and their times t, of shape
+    (rows, ...).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge overrides e = -H(x0): the step
-    is a Poisson map for each fixed e.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    may be arrays with one number for each member.
+    gauge replaces the energy level e = -H(x0): the step is a Poisson map for each fixed e.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape

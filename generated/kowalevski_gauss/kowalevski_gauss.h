@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3e59837d7a09f267ae83fef64961631e961faf721603bc0decabd98d775b968a
+ * body-sha256: 7f4650fc52038e0e16da7d11bfe7d0d707f9e98364e18e541e3e25aae552b537
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -15,10 +15,10 @@ extern "C" {
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
 #define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* number of coefficients: functions of params and h */
-enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
-enum { kowalevski_gauss_WIDTH = 8 };        /* entries of an array over the stages */
+enum { kowalevski_gauss_NODES = 8 };        /* number of stages of a step */
+enum { kowalevski_gauss_WIDTH = 8 };        /* number of entries of an array over the stages */
 enum { kowalevski_gauss_UNKNOWNS = 8 };     /* unknowns of a stage */
-enum { kowalevski_gauss_EARLIER = 2 };      /* steps that predictors read */
+enum { kowalevski_gauss_EARLIER = 2 };      /* number of steps that predictors read */
 
 typedef struct {
     char unused; /* this system has no parameters */
@@ -51,7 +51,7 @@ typedef struct {
     double increments[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[kowalevski_gauss_DIM]; /* the state; change it only by the functions below */
     double carry[kowalevski_gauss_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 37d3e2d446b70614af65519fa469de5b330fa977a8e3daba9b021a9b4fc7d18a
+ * body-sha256: 1340ccc9a65cada629d9b46bc5e9fb4efbb7268174e7c65e1f6194f2d1a69d5a
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -30,7 +30,7 @@ typedef enum { pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_eu
     pendulum_euler_NOT_FINITE, pendulum_euler_BAD_ARGUMENT } pendulum_euler_status;
 const char *pendulum_euler_status_string(pendulum_euler_status status); /* the meaning of a status */
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[pendulum_euler_DIM]; /* the state; change it only by the functions below */
     double carry[pendulum_euler_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -6,14 +6,14 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3cf40dec5cf72e37e94d8e69bccaad1c762f72d70e7b5f8b840ece9760a82ec5
+ * body-sha256: 0adfaa3108b53eb4bd259d2de1b94a8af911e3aa587d6726c19fe498ca463629
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
  * const solver = new Solver({ x0: [...], params: { ... } });
  * solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()
  *
- * Contents: the system, with its kernels; the class Solver; the step, by a formula.
+ * Contents: the system and its formulas; the class Solver; the step, by a formula.
  */
 
 // ---- The system ----

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 888217ebc9bb2be8164bf903e3d3e1a1195effa3c582b7c2438321fb67a7b621
+ * body-sha256: 6073845220d913156d80ae236a2ac1056fa178b791d7cbc0c4536b7dc0122ad2
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -25,9 +25,9 @@
 /* ---- The model ---- */
 const point_vortices_params point_vortices_default_params = { NULL };
 
-enum { point_vortices_RESERVED = 84 };     /* arrays over the sites in the memory of a solver */
-enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
-enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
+enum { point_vortices_RESERVED = 84 };     /* number of arrays over the sites in the memory of a solver */
+enum { point_vortices_ROW = 1 };           /* number of coefficients of one flow */
+enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* number of rows of coefficients */
 enum { point_vortices_SIDES = 2 };         /* arrays of y: before and after a sweep */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* largest number of sweeps of a stage */
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f284de58dd8fe0c0a5feba5e77da4dc020260aa1e0cdfa1503d63c79440270bb
+ * body-sha256: 2a2bf7a6dd486e139f723939bdacd9ec946c961ffd066838b6354f492b67a106
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -22,12 +22,12 @@ typedef struct {
 
 extern const point_vortices_params point_vortices_default_params;
 
-enum { point_vortices_ARRAYS = 3 };       /* arrays over the sites: fields, then parameters */
+enum { point_vortices_ARRAYS = 3 }; /* number of arrays over the sites: fields, then parameters */
 enum { point_vortices_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
-enum { point_vortices_STAGES = 5 };       /* stages of a step */
-enum { point_vortices_DIRECTIONS = 24 };  /* dimension of a Krylov space */
-enum { point_vortices_DIFFERENCES = 2 };  /* differences in the predictor of a stage */
-enum { point_vortices_GATHERED = 4 };     /* sums over bonds or pairs, stored for each site */
+enum { point_vortices_STAGES = 5 }; /* number of stages of a step */
+enum { point_vortices_DIRECTIONS = 24 }; /* dimension of a Krylov space */
+enum { point_vortices_DIFFERENCES = 2 }; /* number of differences in the predictor of a stage */
+enum { point_vortices_GATHERED = 4 }; /* number of sums over bonds or pairs that are stored for each site */
 
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
     point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
@@ -46,8 +46,8 @@ typedef struct {
 typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[point_vortices_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
+    double *x[point_vortices_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[point_vortices_DIM]; /* copies of the fields, which replace them if a step fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
@@ -72,10 +72,10 @@ typedef struct {
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has
-   point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params is required, with
-   the arrays that have no default, and is copied. Returns point_vortices_BAD_ARGUMENT if sizes are not
-   admissible, params or a required array is NULL, x0 or a parameter is not finite, or one that must be
-   positive is not. */
+   point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params must not be NULL,
+   nor those of its arrays that have no default; all arrays are copied. Returns point_vortices_BAD_ARGUMENT if
+   sizes are not admissible, params or a required array is NULL, x0 or a parameter is not finite, or one that
+   must be positive is not. */
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
@@ -93,9 +93,9 @@ void point_vortices_state(const point_vortices_solver *s, double *x);
 point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x);
 point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change);
 
-/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its
-   arrays means defaults. Returns point_vortices_BAD_ARGUMENT for parameters that point_vortices_init refuses,
-   and then changes nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL for one
+   of its arrays means the default values. Returns point_vortices_BAD_ARGUMENT for parameters that
+   point_vortices_init refuses, and then changes nothing. */
 point_vortices_status point_vortices_set_parameters(point_vortices_solver *s,
     const point_vortices_params *params);
 

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 92ff9a25d33c10f4dad7bc987a18d8bf75caf78cef85732ab3a243fe1954fc08
+# body-sha256: 8ea710bf5d0b33efc7c874b6b4addf766cb57b7695df02e83b7a78aabd155025
 import numpy as np
 
 VERSION = "0.1.0"
@@ -166,7 +166,7 @@ def _remember(differences, value):
     """Update the list of backward differences with a new value. Returns how many should be summed for the next
     prediction.
 
-    It is the number that would have predicted the new value best.
+    This number would have predicted the new value best.
     """
     order, least, following = 1, np.inf, value
     for k in range(min(len(differences), DIFFERENCES)):

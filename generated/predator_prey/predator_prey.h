@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 58c4460a6976e031d23a92ec8f132963050a10a67e473eeb15f830f0c5f788d3
+ * body-sha256: eb1c024a4458e9a5ab8c69cb76a78d8b8695bc10c1af0cba44cd4675e63a6736
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -15,7 +15,7 @@ extern "C" {
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 enum { predator_prey_COEFFICIENTS = 11 }; /* number of coefficients: functions of params and h */
-enum { predator_prey_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
+enum { predator_prey_DIFFERENCES = 9 };   /* differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */
@@ -41,7 +41,7 @@ typedef struct {
     double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
 } predator_prey_history;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[predator_prey_DIM]; /* the state; change it only by the functions below */
     double carry[predator_prey_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3955c70c51b80a0ed0f3c881208f8308ed5835cd7531045da3b9d07e5aaeb43c
+ * body-sha256: 105846bac4ff8088c39233955820a094f154a86108550b439c82c3ce54b97463
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -16,7 +16,7 @@ extern "C" {
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* number of coefficients: functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
-enum { quaternion_top_DIFFERENCES = 9 }; /* past differences in the predictor; more would amplify rounding */
+enum { quaternion_top_DIFFERENCES = 9 }; /* differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double I1;     /* least moment of inertia */
@@ -43,7 +43,7 @@ typedef struct {
     double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
 } quaternion_top_history;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[quaternion_top_DIM]; /* the state; change it only by the functions below */
     double carry[quaternion_top_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ac4a048b34352710d067b73dceb927809fe7b88a3bf78b9d6514133e83258f20
+# body-sha256: bb63b2aeea49aee8ac1b4706869b8ced298501e3b2694428fb3c61b720251f6f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -98,7 +98,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -459,8 +459,8 @@ CONTRACTING = 0.05  # a Jacobian is useful if an iteration multiplies the residu
 
 
 def _holds(coef, p, m, slope):
-    """Return for which members the slope of the Taylor series of a path at the point m is pi(m) p, as its equation
-    says.
+    """Return for which members the Taylor series of a path satisfies dm/dt = pi(m) p at the point m, with dm/dt =
+    slope.
 
     A series for which this fails only seems to have converged: it has gaps between its terms, as t + t**9, or extends
     across the kink of an absolute value.
@@ -951,7 +951,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
+    """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
     (coefficients, 1) if all members have the same coefficients.
@@ -1002,10 +1002,11 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    may be arrays with one number for each member.
+    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 5a983d9549a202769de21dc07d7863dee83050a0cece8e02af4b970fea8234df
+ * body-sha256: d2f93c588c0247682013b72dfaa6b6e1187b469026c04c284a2b67c7827e272a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -32,7 +32,7 @@ const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.66666666666666
 enum { rigid_body_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 /* number of past solutions that test a fitted recurrence; the fit leaves them out */
 enum { rigid_body_CHECKS = 8 };
-enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
+enum { rigid_body_PASSES = 2 }; /* so many iterations of a block cost as much per step as one evaluation */
 /* iterations end if the next correction is expected to be below this, relative to y */
 #define rigid_body_TOLERANCE 1e-20
 
@@ -426,7 +426,7 @@ static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], doub
    value. If the error is larger, the motion is chaotic or the step long, and other predictors are as good. */
 #define rigid_body_HOPELESS 1e-7
 
-/* equations of the least-squares problem */
+/* number of equations of the least-squares problem */
 enum { rigid_body_ROWS = (int)rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
     + 1 };
 
@@ -1774,7 +1774,7 @@ typedef struct {
     double gauge[rigid_body_LANES][rigid_body_GAUGES]; /* of each member */
 } rigid_body_group;
 
-/* The solutions of a stage k steps before the last one. */
+/* Return the solutions of a stage, k steps before the last step. */
 static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int k)
 {
     const int row = group->latest + k;

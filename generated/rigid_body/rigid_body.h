@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1845019cfe84a68a401091c92af0cfb49bf7a38fb38d30c571c049af9a3dd255
+ * body-sha256: 6020ee47499f048bb5a4ad2c070c64c7d9dcb16c9c0fe0481d7d3deb87e72ef0
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -16,7 +16,7 @@ extern "C" {
 #define rigid_body_SPEC_SHA256 "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
 enum { rigid_body_COEFFICIENTS = 35 }; /* number of coefficients: functions of params and h */
 enum { rigid_body_GAUGES = 1 };        /* number of Casimirs whose multiples are subtracted from H: C */
-enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */
+enum { rigid_body_REMEMBERED = 111 };  /* number of past solutions that the recurrence is fitted to */
 enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
 enum { rigid_body_AHEAD = 8 };         /* number of solutions that the recurrence predicts */
 
@@ -67,7 +67,7 @@ typedef struct {
     size_t recurrences_from_step;     /* number of the step from which recurrences are tried again */
 } rigid_body_block_measurements;
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[rigid_body_DIM]; /* the state; change it only by the functions below */
     double carry[rigid_body_DIM]; /* rounding error of x: x + carry is more accurate */

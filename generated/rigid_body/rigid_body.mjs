@@ -8,14 +8,14 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 90a4372beaa01381fc8cb5b5d16b8c672a42f641cade6f04ef96655922b43669
+ * body-sha256: d286f3ed67855d74eff342359ffdb950ae365e3025462652304fdc0fe37be8b7
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
  * const solver = new Solver({ x0: [...], params: { ... } });
  * solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()
  *
- * Contents: the system, with its kernels; the class Solver; the step, by Newton's method.
+ * Contents: the system and its formulas; the class Solver; the step, by Newton's method.
  */
 
 // ---- The system ----

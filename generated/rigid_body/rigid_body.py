@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 998c8c92a36b2db635d037fc454b872e3ddf04ab1b7b7423b99c7938e7c30831
+# body-sha256: 1536526d0c994adfdc4fa35a4c5606c5f99599b972aa677bdd0c5ed8d29a79a3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -96,7 +96,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -563,7 +563,7 @@ CLOSE_CALL = 1e-12  # errors that differ by less than this fraction of the sum o
 
 
 def _line(error_of, gauge, c, width):
-    """Return the error as a function of factor c of the gauge, and the sum of the values that determine it.
+    """Return the error as a function of factor c of the gauge, and the sum of the values that determine this function.
 
     The function is given by forward differences (DEGREE + 1, members) of its values at gauge[c] + (j - DEGREE / 2)
     width, j = 0 ... DEGREE. These differences determine the error: it is a sum of squares of terms that are cubic in H,
@@ -702,7 +702,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
+    """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
     The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
     (coefficients, 1) if all members have the same coefficients.
@@ -753,10 +753,11 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    may be arrays with one number for each member.
+    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 07d51d42f598c1accb594312cf03afd80fb30d8e70982768c37de62d820efe85
+ * body-sha256: 7d763dbe2c6bffdfe82a5d719e0ffdd76c97a0cde099da1408b9b453e5af7476
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -41,7 +41,7 @@ typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SI
     thermal_spin_NOT_FINITE, thermal_spin_BAD_ARGUMENT } thermal_spin_status;
 const char *thermal_spin_status_string(thermal_spin_status status); /* the meaning of a status */
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
     double x[thermal_spin_DIM]; /* the state; change it only by the functions below */
     double carry[thermal_spin_DIM]; /* rounding error of x: x + carry is more accurate */

@@ -13,14 +13,14 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9ac570ab1bfa0437d287b752ab9c21905a5f0a32149750d00280d8580d9bb283
+ * body-sha256: 2a2c2569d70240c82422a378c6735683224823a08510f396e8c173b7ce8253ae
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
  * const solver = new Solver({ x0: [...], params: { ... } });
  * solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()
  *
- * Contents: the system, with its kernels; the class Solver; the step, by Newton's method.
+ * Contents: the system and its formulas; the class Solver; the step, by Newton's method.
  */
 
 // ---- The system ----

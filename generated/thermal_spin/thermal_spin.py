@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 54cff00c3e42fe9249f3406adfab0c1e596976b214fa520217252f14ea795cfe
+# body-sha256: efe9b6059319dd07198d54893df3741ccb4df515fe93118f7bf8551d2f9d7caf
 import numpy as np
 
 VERSION = "0.1.0"
@@ -101,7 +101,7 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -459,11 +459,10 @@ def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return for the only stage of a step the coefficients that depend on neither state, time nor noise, the parameters
-    and the step size.
+    """Return the data of the only stage of a step: coefficients, the parameters, and the step size.
 
-    The coefficients form an array (coefficients, members), or (coefficients, 1) if all members have the same
-    coefficients.
+    The coefficients are those that depend on neither state, time nor noise. They form an array (coefficients, members),
+    or (coefficients, 1) if all members have the same coefficients.
     """
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
@@ -471,8 +470,9 @@ def _coefficients(parameters, x, h, gauge):
 def _renewed(stage, t, h, dw):
     """Return the data of the stage in the step of size h that begins at the time t.
 
-    The data are all coefficients, (coefficients, members), the parameters, the step size, and the increments dw of the noise in the step, (increments, members). `stage` is what
-    _coefficients returns.
+    The data are all coefficients, (coefficients, members), the parameters, the step size,
+    and the increments dw of the noise in the step, (increments, members).
+    `stage` is what _coefficients returns.
     """
     coef, parameters, step = stage
     return _table([*coef, *_refresh(coef, dw)]), parameters, step, dw
@@ -517,12 +517,14 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): leading axes are members, each integrated by itself. h and parameters may be
-    arrays with one number for each of them. Raises ValueError for arguments that
-    are not allowed, and StepError as soon as a step of a member fails. The random
-    numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
-    step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them. gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge.
+    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    may be arrays with one number for each member. The random
+    numbers depend on seed, member and number of the step. member is the number of the first member, or an array with
+    the numbers of all members; the first step has the number step0. If increments are given, with the shape (steps,
+    increments) or (steps, members, increments), they replace random increments of the noise.
+    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge.
+    Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
     shape = x.shape

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 3a8c1f2dacd79c3b4fcd8926b0a1b03034d58aff86c1408d732ff5cfec5b7b33
+ * body-sha256: 944698353f9753e5035e3c36e3c01655b2a1f65992cc2654a1f575304161e43a
  */
 #include "toda.h"
 #include <math.h>
@@ -22,12 +22,12 @@
 /* ---- The model ---- */
 const toda_params toda_default_params = { 0 };
 
-enum { toda_HALO = 1 };           /* sites that are copied beyond each end of a row */
-enum { toda_LEAD = 8 };           /* doubles before the first site of a row */
-enum { toda_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
-enum { toda_ROW = 2 };            /* coefficients of one flow */
-enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { toda_FLOWS = 13 };         /* flows in a step */
+enum { toda_HALO = 1 };           /* number of sites that are copied beyond each end of a row */
+enum { toda_LEAD = 8 };           /* number of doubles before the first site of a row */
+enum { toda_RESERVED = 4 };       /* number of arrays over the sites in the memory of a solver */
+enum { toda_ROW = 2 };            /* number of coefficients of one flow */
+enum { toda_ROWS_OF_FLOWS = 14 }; /* number of rows of coefficients */
+enum { toda_FLOWS = 13 };         /* number of flows in a step */
 
 /* Along each axis: the smallest number of sites. */
 static const size_t toda_least[toda_AXES] = { 2 };

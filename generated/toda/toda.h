@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 40596eb6189b3bd60b167397f2c7dfe6c01521ef905fe7b324e07042a2381ffb
+ * body-sha256: b879e94cc191bf3d6f5f4064d676c1044e57884da861cbc8224b3b30e9462bfc
  */
 #ifndef TODA_H
 #define TODA_H
@@ -22,7 +22,7 @@ typedef struct {
 
 extern const toda_params toda_default_params;
 
-enum { toda_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
+enum { toda_ARRAYS = 2 };        /* number of arrays over the sites: fields, then parameters */
 enum { toda_COEFFICIENTS = 28 }; /* number of coefficients: functions of params and h */
 
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
@@ -34,8 +34,8 @@ typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of sites, and of rows */
-    ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
-    double *x[toda_ARRAYS]; /* fields, then parameters at sites, each from its first site */
+    ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
+    double *x[toda_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[toda_DIM]; /* copies of the fields, which replace them if a step fails */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
     size_t full_range; /* number of next steps that use functions for arguments of any size */

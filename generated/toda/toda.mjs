@@ -7,14 +7,14 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c333cce436e3f72e99bd7ef8c1d1624c233b3af7e44b4dc00a0c58d87dd439a9
+ * body-sha256: 2966b071c7c3f45057641631fc0720e605f2fa19448eb70b7cfa00358ad6f7da
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
  * const solver = new Solver({ x0: [...], sizes: [N_i], params: { ... } });
  * solver.integrate(h, steps); then solver.x, .field(name), .t, .hamiltonian(), .density(), .casimirs()
  *
- * Contents: the system, with its kernels; the class Solver; the sites; the step, by flows of parts of H.
+ * Contents: the system and its formulas; the class Solver; the sites; the step, by flows of parts of H.
  */
 
 // ---- The system ----
@@ -404,7 +404,9 @@ function sumOf(values) {
   return sum + rest;
 }
 
-/** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
+/**
+ * The sites of a lattice: their parameters, and tables of the neighbours that functions of the model read.
+ */
 class Sites {
   /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
   constructor(sizes, options) {
@@ -466,7 +468,7 @@ class Sites {
     return place;
   }
 
-  /** The site at an offset from a site; beyond open ends any site, since kernels multiply its values by 0. */
+  /** The neighbour of a site at an offset; beyond open ends any site, whose values are multiplied by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];

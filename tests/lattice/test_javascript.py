@@ -309,7 +309,7 @@ def test_what_is_not_allowed_is_told(what: str, refusals: dict[str, dict[str, An
 @pytest.mark.parametrize(("name", "required"), [("xxz_disorder", True), ("toda", False), ("point_vortices", True)])
 def test_headers_of_c_say_whether_parameters_may_be_null(name: str, required: bool) -> None:
     text = " ".join(emit(compiled(name).program, "c", "phigen")[f"{name}.h"].split())
-    assert ("params is required, with the arrays that have no default" in text) == required
+    assert ("params must not be NULL, nor those of its arrays that have no default" in text) == required
     assert ("params may be NULL for the defaults" in text) != required
 
 

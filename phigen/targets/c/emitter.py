@@ -166,7 +166,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         public.append(("OBSERVABLES", len(program.observed), f"observables: {', '.join(program.observed)}"))
     if program.modified:
         public.append(("MODIFIED_POWER", program.modified.power, "power of h in the error of the modified Hamiltonian"))
-    sizes: Sizes = [("STAGES", len(program.fractions), "stages of a step")] if has["COMPOSED"] else []
+    sizes: Sizes = [("STAGES", len(program.fractions), "number of stages of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
     sizes.append(
         ("COEFFICIENTS", max(1, program.step.coefficients), f"number of coefficients: functions of params and h{also}")
@@ -190,7 +190,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
             (
                 "DIFFERENCES",
                 predictor.differences,
-                "past differences in the predictor; more would amplify rounding",
+                "differences in the predictor; more would amplify rounding",
             )
         )
     sizes += text_of(program).declared(step, lanes)
@@ -199,7 +199,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         sizes.append(("MOST_EVALUATIONS", most, "largest number of evaluations of the kernel in a step"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
-        sizes.append(("REMEMBERED", memory["REMEMBERED"], "past solutions that the recurrence is fitted to"))
+        sizes.append(("REMEMBERED", memory["REMEMBERED"], "number of past solutions that the recurrence is fitted to"))
         sizes.append(("WINDOW", memory["WINDOW"], "largest number of past solutions in the recurrence"))
         sizes.append(("AHEAD", memory["AHEAD"], "number of solutions that the recurrence predicts"))
     return {
@@ -329,7 +329,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         )
     if has["BLOCKS"] and isinstance(lanes, Blocks):
         passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
-        sizes.append(("PASSES", passes, "iterations of a block that cost as much per step as one evaluation"))
+        sizes.append(("PASSES", passes, "so many iterations of a block cost as much per step as one evaluation"))
         if lanes.factors:
             entries = len(lanes.factors.factorise.roots)
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))

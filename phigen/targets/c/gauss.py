@@ -50,10 +50,14 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
     """
     width = _width(step, lanes)
     return [
-        ("NODES", step.tableau.stages, "stages of a step"),
-        ("WIDTH", width, "entries of an array over the stages" + ", to fill a vector" * (width > step.tableau.stages)),
+        ("NODES", step.tableau.stages, "number of stages of a step"),
+        (
+            "WIDTH",
+            width,
+            "number of entries of an array over the stages" + ", to fill a vector" * (width > step.tableau.stages),
+        ),
         ("UNKNOWNS", step.unknowns, "unknowns of a stage"),
-        *([("EARLIER", EARLIER, "steps that predictors read")] if isinstance(lanes, Stages) else []),
+        *([("EARLIER", EARLIER, "number of steps that predictors read")] if isinstance(lanes, Stages) else []),
         *([("LIFT", step.lift.size, "components of frames of group elements")] if step.lift else []),
     ]
 

@@ -12,7 +12,7 @@ LATTICE = (
         members=(
             "size_t sizes[PHI_AXES];   /* number of sites along each axis */",
             "size_t sites, rows;       /* number of sites, and of rows */",
-            "ptrdiff_t length, width;  /* sites of a row; doubles from the start of a row to that of the next */",
+            "ptrdiff_t length, width;  /* number of sites of a row; number of doubles from a row to the next */",
         ),
     ),
     StateBlock(
@@ -27,7 +27,7 @@ LATTICE = (
     ),
     StateBlock(
         "x",
-        members=("double *x[PHI_ARRAYS]; /* fields, then parameters at sites, each from its first site */",),
+        members=("double *x[PHI_ARRAYS]; /* the values of fields, then of parameters at sites */",),
         reset=("for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;",),
     ),
     StateBlock(

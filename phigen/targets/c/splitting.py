@@ -21,10 +21,12 @@ from phigen.targets.c.loops import commented, table
 
 def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     """Return the sizes of a splitting as constants: name, value and comment."""
-    constants = [("ROWS_OF_FLOWS", len(step.schedule.times), "rows of coefficients, one for each duration of a flow")]
-    constants.append(("ROW", max(1, step.row), "coefficients in a row"))
+    constants = [
+        ("ROWS_OF_FLOWS", len(step.schedule.times), "number of rows of coefficients, one for each duration of a flow")
+    ]
+    constants.append(("ROW", max(1, step.row), "number of coefficients in a row"))
     flows = len(step.schedule.flows_of_run)
-    said = "flows in a run of one step" if step.schedule.begin else "flows in a step"
+    said = "number of flows in a " + ("run of one step" if step.schedule.begin else "step")
     constants += [("FLOWS", flows, said)] if step.tangents or step.adjoint else []
     corrected = step.adjoint is not None and bool(step.schedule.begin)
     return (

@@ -136,7 +136,7 @@ def _contents(program: Program) -> list[str]:
         f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",
         "solver.integrate(h, steps); then solver.x, .t, .hamiltonian(), .casimirs(), .vectorField()",
         "",
-        "Contents: the system, with its kernels; the class Solver; the step, by " + program.step.kind.title + ".",
+        "Contents: the system and its formulas; the class Solver; the step, by " + program.step.kind.title + ".",
     ]
     return lines
 

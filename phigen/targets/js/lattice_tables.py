@@ -104,7 +104,7 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
         f"const solver = new Solver({{ {', '.join(options)} }});",
         "solver.integrate(h, steps); then solver.x, .field(name), .t, .hamiltonian(), .density(), .casimirs()",
         "",
-        f"Contents: the system, with its kernels; the class Solver; the sites; the step, by {how}.",
+        f"Contents: the system and its formulas; the class Solver; the sites; the step, by {how}.",
     ]
 
 

@@ -11,18 +11,19 @@ from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.policies import PYTHON, policies_of
 
 _NOISE_ARGUMENTS = """ The random
-    numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
-    step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them."""
+    numbers depend on seed, member and number of the step. member is the number of the first member, or an array with
+    the numbers of all members; the first step has the number step0. If increments are given, with the shape (steps,
+    increments) or (steps, members, increments), they replace random increments of the noise."""
 
 #: Sentences for docstrings in generated modules. Their subjects are the gauge, the energy level, and steps of equal
 #: size in tau, where tau is the time of a monitor.
-_OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
-    overrides the choice of the solver: the step is a Poisson map for each fixed gauge."""
-_OF_LEVEL = """gauge overrides e = -H(x0): the step
-    is a Poisson map for each fixed e."""
+_OF_GAUGE = """gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
+    is a Poisson map for each fixed gauge."""
+_OF_LEVEL = "gauge replaces the energy level e = -H(x0): the step is a Poisson map for each fixed e."
 _OF_TAU = """
 
-    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...)."""
+    Steps have size h in the time tau. With times=True, the result is a pair: the states, and their times t, of shape
+    (rows, ...)."""
 
 
 def values_of(program: Program) -> dict[str, object]:

@@ -27,8 +27,8 @@ static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_l
 #endif
 }
 
-/* From given cotangents of the stage increments, compute what they contribute to the cotangents of the start of the
-   step and of the coefficients, and add it. */
+/* Given the cotangents of the stage increments, add their contributions to the cotangents of the start of the step and
+   of the coefficients. */
 static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *increments_bar, phi_cotangent *bar)
 {

@@ -33,7 +33,7 @@ typedef struct {
     PHI_GAUGES_OF_MEMBERS
 } phi_group;
 
-/* The solutions of a stage k steps before the last one. */
+/* Return the solutions of a stage, k steps before the last step. */
 static phi_lanes *phi_group_past(phi_group *group PHI_AND_INT_STAGE, int k)
 {
     const int row = group->latest + k;

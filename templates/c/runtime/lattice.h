@@ -33,23 +33,23 @@ phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
 phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
 #if PHI_SERIES || PHI_NOISE
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
-   s->steps counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
+   counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 #elif PHI_CORRECTED
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
-   s->steps counts the successful steps. Each call begins and ends with the flows of the corrector. OpenMP updates rows in parallel, with
-   the same bits for any number of threads. */
-#else
-/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
-   s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or call. OpenMP updates rows in
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
+   counts the successful steps. Each call begins and ends with the flows of the corrector. OpenMP updates rows in
    parallel, with the same bits for any number of threads. */
+#else
+/* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
+   counts the successful steps. The last flow of a step is merged with the first of the next step or call. OpenMP
+   updates rows in parallel, with the same bits for any number of threads. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* Make one step, or many, and multiply the tangent vectors v[vector][field][site] by the derivative of these steps, exact to
-   round-off. count is the number of vectors, work is memory of phi_tangent_size(s, count) bytes. If a step fails, v is
-   unchanged. */
+/* Make one step, or many, and multiply the tangent vectors v[vector][field][site] by the derivative of these steps,
+   exact to round-off. count is the number of vectors, work is memory of phi_tangent_size(s, count) bytes. If a step
+   fails, v is unchanged. */
 size_t phi_tangent_size(const phi_solver *s, size_t count);
 phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
 phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work);
@@ -76,18 +76,19 @@ phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, doubl
 /* Copy the state to x[field][site]. */
 void phi_state(const phi_solver *s, double *x);
 
-/* Between steps: replace the state by x[field][site], or add change[field][site] to it. Returns PHI_BAD_ARGUMENT and leaves
-   the state unchanged if the new state is not finite. */
+/* Between steps: replace the state by x[field][site], or add change[field][site] to it. Returns PHI_BAD_ARGUMENT and
+   leaves the state unchanged if the new state is not finite. */
 phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
 #if PHI_BODIES || PHI_MONITOR
-/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
-   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses. If it refuses them because of the state or of
-   masses, they are replaced nevertheless; then replace them again before the next step. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL for one of its
+   arrays means the default values. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses. If it refuses them
+   because of the state or of masses, they are replaced nevertheless; then replace them again before the next step. */
 #else
-/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
-   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses, and then changes nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL for one of its
+   arrays means the default values. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses, and then changes
+   nothing. */
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
@@ -102,19 +103,19 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, s
    the state. These functions return PHI_BAD_ARGUMENT where -B is not positive. */
 double phi_solver_time(const phi_solver *s);
 
-/* Save and restore the energy level e and the physical time; to restore a run, call phi_resume_clock after phi_resume. */
+/* Save and restore e and the physical time. To restore a run, call phi_resume, then phi_resume_clock. */
 void phi_saved_clock(const phi_solver *s, double clock[5]);
 phi_status phi_resume_clock(phi_solver *s, const double clock[5]);
 
-/* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the Casimirs; the
-   right-hand side out[field][site] of the equations of motion. */
+/* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the Casimirs;
+   the right-hand side out[field][site] of the equations of motion. */
 double phi_hamiltonian(const phi_solver *s);
 void phi_density(const phi_solver *s, double *out);
 void phi_casimirs(const phi_solver *s, double *out);
 void phi_vector_field(const phi_solver *s, double *out);
 
-/* Compute the observables, in the order of phi_OBSERVABLES. Sums are compensated, and have the same bits for any number of
-   threads. */
+/* Compute the observables, in the order of phi_OBSERVABLES. Sums are compensated, and have the same bits for any number
+   of threads. */
 void phi_observables(const phi_solver *s, double *out);
 
 /* Compute the observables with a value at each site, out[k][site], in the order of phi_OBSERVED_FIELDS. */

@@ -14,8 +14,8 @@ size_t phi_stages(void);
 phi_status phi_describe(size_t number, phi_stage *about);
 
 /* phi_begin computes the coefficients for a step size; call it before the first stage. phi_sweep makes a stage for the
-   planes from ... to - 1. With full_range = 1 it uses functions for arguments of any size; with full_range = 0
-   faster ones, which give NaN if an argument is too large. */
+   planes from ... to - 1. With full_range = 1, it uses functions for arguments of any size; with full_range = 0, it
+   uses faster functions, which give NaN if an argument is too large. */
 phi_status phi_begin(phi_solver *s, double h);
 phi_status phi_sweep(phi_solver *s, size_t number, int full_range, size_t from, size_t to);
 

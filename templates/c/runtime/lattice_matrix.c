@@ -5,8 +5,8 @@
 
 /* The Newton matrix 1 - (derivative of a sweep by y), with unknowns numbered site by site. It is banded, except for
    entries that couple the two ends of a ring. So the last sites form a border, and the matrix has blocks (A B; C D); in
-   small lattices all sites are in the border. Stored are the LU factors of the banded A, A^-1 B in place of B, and the
-   factors of D - C A^-1 B in place of D. */
+   small lattices all sites are in the border. The memory holds the LU factors of the banded A, then A^-1 B in place of
+   B, and the LU factors of D - C A^-1 B in place of D. */
 enum { PHI_FEW = 6 * PHI_REACH + 6, PHI_TALL = 3 * PHI_BAND + 1 };
 
 typedef struct {

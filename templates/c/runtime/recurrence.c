@@ -16,7 +16,7 @@
    is larger, the motion is chaotic or the step long, and other predictors are as good. */
 #define PHI_HOPELESS 1e-7
 
-enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least-squares problem */
+enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* number of equations of the least-squares problem */
 
 /* Make eight columns orthogonal to one column, by subtracting multiples of it; r receives the factors. If the column is one
    of the eight, columns up to it are unchanged, and *inverse becomes 1 / (its squared norm). The number of rows is even. */

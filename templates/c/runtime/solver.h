@@ -11,7 +11,7 @@ const char *phi_status_string(phi_status status); /* the meaning of a status */
 
 #include "blocks_measurements.h"
 
-/* A struct without pointers: a copy is an independent solver. Arguments may point into it, or overlap. */
+/* A copy of this struct is an independent solver. Arguments of functions may point into it, or overlap. */
 typedef struct {
 #include "state_members.h"
 } phi_solver;

@@ -7,7 +7,7 @@
 #include "stage_predicted.c"
 #include "stage_alone.c"
 
-/* Make the stages of one step. If one fails, the state is that before the step. */
+/* Make the stages of one step. If a stage fails, the state before the step is kept. */
 static phi_status phi_stages(phi_solver *s)
 {
     phi_status status = PHI_OK;

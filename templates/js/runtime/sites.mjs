@@ -23,7 +23,9 @@ export function sumOf(values) {
   return sum + rest;
 }
 
-/** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
+/**
+ * The sites of a lattice: their parameters, and tables of the neighbours that functions of the model read.
+ */
 export class Sites {
   /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
   constructor(sizes, options) {
@@ -156,7 +158,7 @@ export class Sites {
     return place;
   }
 
-  /** The site at an offset from a site; beyond open ends any site, since kernels multiply its values by 0. */
+  /** The neighbour of a site at an offset; beyond open ends any site, whose values are multiplied by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];

@@ -33,24 +33,30 @@ def declarations(program: Program, step: Sweeps) -> str:
     listed = [_declared(p, member[p.name]) for p in program.parameters]
     arrays = len(layout.lattice.arrays)
     sizes = [
-        ("ARRAYS", arrays, f"arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}"),
+        (
+            "ARRAYS",
+            arrays,
+            f"number of arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}",
+        ),
         ("COEFFICIENTS", max(1, step.row * rows_of(step)), "number of coefficients: functions of params and h"),
     ]
     if step.equation:
         stages, has = len(program.fractions), switches(layout)
-        sizes += [("STAGES", stages, "stages of a step")] if stages > 1 else []
+        sizes += [("STAGES", stages, "number of stages of a step")] if stages > 1 else []
         sizes += (
             [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
         )
         sizes += (
-            [("DIFFERENCES", _differences(program), "differences in the predictor of a stage")]
+            [("DIFFERENCES", _differences(program), "number of differences in the predictor of a stage")]
             if has["SWEEP_PREDICTORS"]
             else []
         )
     if step.partners:
-        sizes.append(("GATHERED", _gathered(layout), "sums over bonds or pairs, stored for each site"))
+        sizes.append(
+            ("GATHERED", _gathered(layout), "number of sums over bonds or pairs that are stored for each site")
+        )
     if step.sites.at_bonds:
-        sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
+        sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "number of parameters at bonds"))
     values = {
         "NAME": program.name,
         "axes": len(step.sites.axes),
@@ -195,13 +201,13 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     if densities := program.observables.named:
         yield "SHARE", share(densities), "sites whose densities of observables are computed in one pass"
     if has["HALO"]:
-        yield "HALO", layout.halo, "sites that are copied beyond each end of a row"
-        yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
-    yield "RESERVED", _reserved(layout, has), "arrays over the sites in the memory of a solver"
+        yield "HALO", layout.halo, "number of sites that are copied beyond each end of a row"
+        yield "LEAD", (layout.halo + 7) // 8 * 8, "number of doubles before the first site of a row"
+    yield "RESERVED", _reserved(layout, has), "number of arrays over the sites in the memory of a solver"
     if several:
-        yield "LINES", len(layout.lines), "rows that kernels read: the row itself and its neighbours"
-    yield "ROW", max(1, step.row), "coefficients of one flow"
-    yield "ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"
+        yield "LINES", len(layout.lines), "number of rows that loops over a row read: the row itself and its neighbours"
+    yield "ROW", max(1, step.row), "number of coefficients of one flow"
+    yield "ROWS_OF_FLOWS", rows_of(step), "number of rows of coefficients"
     if step.refresh:
         yield (
             "PREPARED",
@@ -222,9 +228,9 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
             yield "REACH", reach(step), "y at a site depends on so many sites on each side"
-            yield "BAND", band(step), "off-diagonals on each side in the matrix of Newton's method"
+            yield "BAND", band(step), "number of off-diagonals on each side in the matrix of Newton's method"
     else:
-        yield "FLOWS", len(step.schedule.flows), "flows in a step"
+        yield "FLOWS", len(step.schedule.flows), "number of flows in a step"
     if step.corrected:
         yield (
             "FLOWS_BEFORE",
