@@ -342,7 +342,7 @@ class CompiledSeries(_CompiledSystem):
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
-        """Return this compilation, since its scheme is a series."""
+        """Return this compilation. Compilations with other schemes raise `ValueError`."""
         return self
 
     def by_kind(
@@ -397,7 +397,7 @@ class CompiledSplitting(_CompiledSystem):
         return [*self.spec.series_settings, *(f"solver: {key}" for key in self.spec.solve_settings)]
 
     def by_splitting(self) -> CompiledSplitting:
-        """Return this compilation, since its scheme is a splitting."""
+        """Return this compilation. Compilations with other schemes raise `ValueError`."""
         return self
 
     def by_kind(
@@ -470,7 +470,7 @@ class CompiledGauss(_CompiledSystem):
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
-        """Return this compilation, since its scheme is Gauss collocation."""
+        """Return this compilation. Compilations with other schemes raise `ValueError`."""
         return self
 
     def by_kind(
@@ -565,7 +565,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation, since it is the compilation of a lattice."""
+        """Return this compilation. Compilations of other systems raise `ValueError`."""
         return self
 
     def by_kind(

@@ -4,10 +4,10 @@
                             │   └─► SplitHamiltonian ───────────────────────────┘  │
                             └───────────────────────► Examination ◄────────────────┘
 
-Each stage is a function from one frozen dataclass to the next. `Compilation` holds the results of all stages and their
-durations. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request. `Discretisation` holds
-the generating function. `Examination` holds the proofs. Statements about the system are proved before the method is
-built, and statements about the method afterwards.
+Each arrow is a function from one frozen dataclass to the next. `Compilation` holds the results and durations of all
+these functions. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request. `Discretisation`
+holds the generating function. `Examination` holds the proofs. Statements about the system are proved before the method
+is built, and statements about the method afterwards.
 """
 
 from __future__ import annotations
@@ -351,8 +351,8 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
     With the key ``coordinates_from``, there is one part for each body. Otherwise some parts may be known motions, such
     as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. Known motions are not used
-    with a monitor (rescaled time: dt = g dτ). Neither are they used if the whole of H would be one known motion
-    although the spec names a composition.
+    with a monitor. Neither are they used if the whole of H would be one known motion although the spec names a
+    composition.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
@@ -454,16 +454,16 @@ def bounded(spec: Spec) -> Iterator[None]:
 
 
 class _Clock:
-    """Stopwatch for the stages of a compilation.
+    """Stopwatch for the tasks of a compilation.
 
-    ``seconds`` has the duration of each stage, or the sum of the durations if a stage is entered several times.
+    ``seconds`` has the duration of each task, or the sum of the durations if a task is entered several times.
     """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
-        """Return the result of ``work()``, and add its duration to the stage."""
+        """Return the result of ``work()``, and add its duration to the task named ``stage``."""
         with progress.stage(stage) as running:
             result = work()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + running.seconds

@@ -186,10 +186,11 @@ class DistributedLattice:
 
 
 class _Domain:
-    """The planes of one process, with copies of neighbouring planes, and the steps of these planes.
+    """The part of a lattice on one process: its planes, copies of neighbouring planes, and the steps of the planes. A
+    plane is the set of all sites with one index of the first axis.
 
-    The last flow of a step is merged with the first flow of the next step. ``open`` is true while this last flow is
-    missing.
+    The last flow of a step is merged with the first flow of the next step. So the last flow is not applied at once;
+    until it is applied, ``open`` is true.
     """
 
     def __init__(

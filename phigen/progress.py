@@ -1,7 +1,7 @@
-"""Progress of the compiler: named, nested stages that an observer, such as the command line, can follow.
+"""Progress of the compiler: named, nested tasks that an observer, such as the command line, can follow.
 
-The compiler reports its stages by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. Without
-an observer, a stage costs a microsecond. `phigen.cli.display` shows the stages.
+The compiler reports a task by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. Without an
+observer, a task costs a microsecond. `phigen.cli.display` shows the tasks.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Context manager for a stage of a compilation.
+    """Context manager for a task of a compilation.
 
-    The work of a stage has ``total`` parts, of which ``done`` are completed; ``total`` is 0 if the number is unknown.
-    ``began`` is the time at which the stage started.
+    The work of a task has ``total`` parts, of which ``done`` are completed; ``total`` is 0 if the number is unknown.
+    ``began`` is the time at which the task started.
     """
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
@@ -40,7 +40,7 @@ class Stage:
 
     @property
     def seconds(self) -> float:
-        """Duration in seconds of a stage that has ended."""
+        """Duration in seconds of a task that has ended."""
         return self._end - self.began
 
     def __str__(self) -> str:
@@ -49,14 +49,14 @@ class Stage:
         return f"{self.name}, {self.done}" if self.done else self.name
 
 
-#: Observer of a compilation. It is called whenever a stage starts or ends, with the active stages, outermost first.
+#: Observer of a compilation. It is called whenever a task starts or ends, with the active tasks, outermost first.
 Watcher = Callable[[tuple[Stage, ...]], None]
 
 stage = Stage
 
 
 class _Here(threading.local):
-    """The active stages of one thread, and the observer of this thread."""
+    """The active tasks of one thread, and the observer of this thread."""
 
     def __init__(self) -> None:
         self.stages: list[Stage] = []
@@ -68,7 +68,9 @@ _here = _Here()
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Context in which the function ``watcher`` is called with the active stages of this thread."""
+    """Context in which ``watcher`` is called whenever a task of this thread starts or ends. Its argument is the tuple
+    of the active tasks, outermost first.
+    """
     previous_watcher, _here.watcher = _here.watcher, watcher
     try:
         yield

@@ -67,7 +67,9 @@ class Group:
 
     @property
     def orthogonal(self) -> bool:
-        """Whether group elements are quaternions or orthogonal matrices; for matrices, all generators are then skew."""
+        """Whether group elements are quaternions or orthogonal matrices. Matrices of the group are orthogonal if all
+        basis matrices of its Lie algebra are skew.
+        """
         return all((m[i][j] + m[j][i]).is_zero for m in self.matrices for i in range(len(m)) for j in range(len(m)))
 
     def generator(self, p: Sequence[Expression]) -> list[Expression]:

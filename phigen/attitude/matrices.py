@@ -30,9 +30,10 @@ Flat = list[Expression]
 
 
 def size_of(group: Group, p: Sequence[Expression]) -> Expression:
-    """Return an upper bound for the squared modulus of the largest eigenvalue of P = Σ p_i E_i.
+    """Return an upper bound for the squared modulus of the largest eigenvalue of P = Σ p_i E_i, with the basis matrices
+    E_i of the Lie algebra.
 
-    The bound is the sum of the squares of all entries of P or, if all generators are skew, half of this sum.
+    The bound is the sum of the squares of all entries of P or, if all E_i are skew, half of this sum.
     """
     squares = total(e**2 for e in group.generator(p))
     return _HALF * squares if group.orthogonal else squares
@@ -82,7 +83,7 @@ def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
     """Yield the elementary symmetric functions of the eigenvalues of P = Σ p_i E_i, from 1 to the determinant.
 
-    If all generators are skew, the functions of odd degree are 0.
+    If all basis matrices E_i of the Lie algebra are skew, the functions of odd degree are 0.
     """
     powers = _powers(group, p)
     rows = len(powers) + 1

@@ -302,13 +302,15 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """Return bounds for the error of u after a correction, if its error before the correction is at most e."""
+        """Return bounds for the distance of u from the solution after a correction, if this distance was at most e
+        before it.
+        """
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """Return bounds for the error of u, if the correction or residual that the C has measured is at most
-        ``size``.
+        """Return bounds for the distance of u from the solution, if the correction or residual that the C has measured
+        is at most ``size``.
         """
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 

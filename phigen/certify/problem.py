@@ -70,8 +70,9 @@ def problem_of(
 
 
 def _expect_covered(program: Program, spec: Spec) -> None:
-    """Raise `SpecError` for noise, single precision, some Gauss steps, and flows by functions that certificates do not
-    cover."""
+    """Raise `SpecError` for solvers that certificates do not cover. These are solvers with noise or in single
+    precision, some Gauss steps, and splittings whose flows call one of the functions in `_FLOWS`.
+    """
     refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))

@@ -1,4 +1,5 @@
-"""Measurement of rounding errors: steps of the compiled C are compared with the exact map in many digits.
+"""Measurement of rounding errors: steps of the compiled C are compared with the exact map, which is computed in high
+precision.
 
 The measured errors show how much larger the certified bounds are.
 """
@@ -38,7 +39,7 @@ def _precise() -> Iterator[None]:
 
 
 class ExactMap:
-    """The map that a step of a solver approximates, computed in many digits.
+    """The map that a step of a solver approximates, computed in high precision.
 
     ``c`` is the result of `phigen.certify.prove.described` with ``exact``.
     """

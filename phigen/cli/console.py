@@ -73,7 +73,7 @@ class Console:
             yield
 
     def watching(self) -> AbstractContextManager[None]:
-        """Context in which the stages of the compiler are shown.
+        """Context in which the tasks of the compiler are shown.
 
         On a terminal they appear as a status line, unless -q is given; with -v they are printed as messages.
         """

@@ -1,5 +1,5 @@
-"""Display of the compiler's stages on stderr. On a terminal, one line shows the active stages; with -v, each stage has
-a line.
+"""Display of the compiler's tasks on stderr. On a terminal, one line shows the active tasks; with -v, each task has a
+line.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ DELAY, PERIOD = 1.0, 0.2
 
 
 class Display:
-    """Status line of the active stages of the compiler.
+    """Status line of the active tasks of the compiler.
 
-    The line is drawn if ``shows`` returns true. When a stage starts, ``began`` is called with its name.
+    The line is drawn if ``shows`` returns true. When a task starts, ``began`` is called with its name.
     """
 
     def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:
@@ -33,7 +33,7 @@ class Display:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Context in which the stages of the compiler that run in this thread are shown."""
+        """Context in which the tasks of the compiler that run in this thread are shown."""
         try:
             with progress.watched(self._receive_stages):
                 yield

@@ -22,11 +22,7 @@ def draw_along(axes: Any, constancy: Constancy) -> None:
 
 
 def draw_against_step(axes: Any, constancy: Constancy) -> None:
-    """Draw the largest error of the modified Hamiltonian H̃ over the step size.
-
-    There is a curve for each number of corrections. A thin line beside each curve has the slope that is expected for
-    it.
-    """
+    """Draw the largest error of the modified Hamiltonian H̃ against the step size."""
     for m, power in enumerate(constancy.powers):
         changes = constancy.changes[:, m]
         axes.plot(constancy.sizes, np.where(changes > 0, changes, np.nan), linewidth=1.0, marker="osD"[m % 3],

@@ -47,7 +47,8 @@ _SECTION, _SQUARE = 3.4, 3.8
 
 @styled
 def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
-    """Return a figure of a trajectory in phase space: in a plane, in space, or as several projections.
+    """Return a figure of a trajectory in phase space: a plot of two coordinates, a three-dimensional plot, or several
+    projections.
 
     For three coordinates, the symplectic leaf is drawn too. This is the surface on which the first of the ``casimirs``
     (formulas by name) has its initial value.
@@ -61,11 +62,11 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 @styled
 def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
-    """Return a figure with the errors of energy and Casimirs over time, for several methods.
+    """Return a figure with the errors of energy and Casimirs against time, for several methods.
 
     Each quantity has a panel. Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. A long run is
-    divided into some hundred windows of time, and only the largest error in each window is drawn. Errors of 0 are drawn
-    at a separate tick. A cross marks the time at which a method failed.
+    divided into some hundred intervals of time, and only the largest error in each interval is drawn. Errors of 0 are
+    drawn at a separate tick. A cross marks the time at which a method failed.
     """
     figure = _figure(error_curves.height(methods))
     error_curves.draw_errors(figure, methods, units)
@@ -85,7 +86,7 @@ def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figu
 
 @styled
 def convergence_figure(study: Study) -> Figure:
-    """Return a figure of final errors over the step size, with a curve for each method.
+    """Return a figure of final errors against the step size, with a curve for each method.
 
     A thin line has the slope that the order of the first method predicts.
     """
@@ -96,7 +97,7 @@ def convergence_figure(study: Study) -> Figure:
 
 @styled
 def work_precision_figure(study: Study) -> Figure:
-    """Return a figure of the final errors of solution and Casimirs over the computing time."""
+    """Return a figure of the final errors of solution and Casimirs against the computing time."""
     panels = [precision_curves.draw_work, precision_curves.draw_conserved][: 1 + study.has_casimirs]
     figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
     for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
@@ -106,7 +107,7 @@ def work_precision_figure(study: Study) -> Figure:
 
 @styled
 def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
-    """Return a figure of errors over computing time for all settings that a tuning has tried.
+    """Return a figure of errors against computing time for all settings that a tuning has tried.
 
     Stars mark the proposed steps.
     """
@@ -119,8 +120,8 @@ def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
 
 @styled
 def constancy_figure(constancy: Constancy) -> Figure:
-    """Return a figure of the errors of H and of the modified Hamiltonian H̃, along a trajectory and over the
-    step size.
+    """Return a figure of the errors of H and of the modified Hamiltonian H̃: along a trajectory, and against the step
+    size.
     """
     figure = _figure(_SQUARE)
     time_panel, step_panel = figure.subplots(1, 2)

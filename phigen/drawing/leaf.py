@@ -1,4 +1,4 @@
-"""Symplectic leaf in space: the surface on which a Casimir is constant.
+"""Symplectic leaf in a three-dimensional plot: the surface on which a Casimir is constant.
 
 The surface is drawn as a net of curves. Each curve is the intersection of the surface with a plane.
 """

@@ -1,4 +1,4 @@
-"""Ticks and axis names of panels in space.
+"""Ticks and axis names of three-dimensional plots.
 
 matplotlib only estimates the room for ticks and names. This module places them by the measured sizes of their texts.
 """
@@ -25,7 +25,7 @@ _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸�
 
 
 def letter(axes: Any, names: tuple[str, ...], box: Floats, max_ticks: int) -> None:
-    """Set ticks and names of the axes of a panel in space that shows the ``box`` (2, 3).
+    """Set ticks and names of the axes of a three-dimensional plot that shows the ``box`` (2, 3).
 
     Each axis has about ``max_ticks`` ticks. If the ticks show values divided by a power of ten, the name of the axis
     contains this power.
@@ -53,9 +53,9 @@ def _ticks(low: float, high: float, max_ticks: int) -> list[float]:
 
 
 def move_apart(figure: Figure) -> None:
-    """Move axis names of panels in space outwards until they overlap no other text of their panel.
+    """Move axis names of three-dimensional plots outwards until they overlap no other text of their plot.
 
-    The panels shrink if names would leave the figure.
+    The plots shrink if names would leave the figure.
     """
     spaces, layout = figure.findobj(lambda artist: hasattr(artist, "zaxis")), cast(Any, figure.get_layout_engine())
     left = right = 0.0
@@ -63,7 +63,8 @@ def move_apart(figure: Figure) -> None:
         figure.draw_without_rendering()
         names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
         meeting = [axis for axes in spaces for axis in _meeting(axes)]
-        # The layout of matplotlib reserves space for ticks, but no space for the names of axes in space.
+        # The layout of matplotlib reserves room for ticks, but none for the names of the axes of three-dimensional
+        # plots.
         overhang = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
         left, right = max(left, left - overhang[0]), max(right, right + overhang[1])
         if not meeting and overhang[0] >= 0 and overhang[1] <= 0:

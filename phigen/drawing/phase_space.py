@@ -1,5 +1,6 @@
-"""Drawings of trajectories in phase space: in planes, in space with the leaf of a Casimir, or as coordinates over
-time."""
+"""Drawings of trajectories in phase space: plots of two coordinates, three-dimensional plots with the leaf of a
+Casimir, or plots of coordinates against time.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +23,19 @@ from phigen.symbolic.expression import Expression
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Largest number of coordinates with separate panels; more coordinates are drawn as one image over time.
+#: Largest number of coordinates with separate panels; more coordinates are drawn as one image against time.
 MOST_COORDINATES = 24
 #: Points are drawn as dots if the typical angle between successive chords exceeds TURN, since a line would not show the
 #: orbit. For long curves the limit is FINE_TURN, since the chords of a long curve would cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
 #: A curve is long if its length is at least this multiple of the size of its panel.
 LONG = 60.0
-#: ELEVATION: elevation of the view in space. AZIMUTHS: azimuths to choose from; the first is the default. Angles are in
-#: degrees. BANDS: a curve is drawn in this number of parts by distance from the viewer; the farther parts are paler.
+#: ELEVATION: elevation of the view in three-dimensional plots. AZIMUTHS: azimuths to choose from; the first is the
+#: default. Angles are in degrees. BANDS: a curve is drawn in this number of parts by distance from the viewer; the
+#: farther parts are paler.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
-#: Zoom of a box in space in a small panel. The zoom in large panels is larger.
+#: Zoom of the box of a three-dimensional plot in a small panel. The zoom in large panels is larger.
 SMALL = 0.76
 
 
@@ -188,7 +190,7 @@ def joins(points: Floats) -> bool:
 
 
 def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
-    """Draw all coordinates over time, as colours."""
+    """Draw all coordinates against time, as colours."""
     axes = figure.add_subplot()
     times = np.linspace(0, len(t) - 1, min(len(t), 800)).astype(int)
     image = axes.imshow(

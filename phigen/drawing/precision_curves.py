@@ -1,4 +1,4 @@
-"""Plots of errors over step size and over computing time."""
+"""Plots of errors against step size and against computing time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MARKERS = "osD^vX"
 
 
 def draw_convergence(axes: Any, study: Study) -> None:
-    """Draw errors over step size.
+    """Draw errors against step size.
 
     The labels state the observed orders. A thin line has the slope that the order of the first method predicts.
     """
@@ -27,7 +27,7 @@ def draw_convergence(axes: Any, study: Study) -> None:
 
 
 def draw_work(axes: Any, study: Study) -> None:
-    """Draw errors of the solution over the computing time of a run in seconds."""
+    """Draw errors of the solution against the computing time of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
@@ -35,7 +35,7 @@ def draw_work(axes: Any, study: Study) -> None:
 
 
 def draw_conserved(axes: Any, study: Study) -> None:
-    """Draw the largest error of a Casimir over the computing time of a run in seconds."""
+    """Draw the largest error of a Casimir against the computing time of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")

@@ -1,4 +1,4 @@
-"""Plot of error over computing time for all settings that a tuning has tried."""
+"""Plot of the error against the computing time, for all settings that a tuning has tried."""
 
 from __future__ import annotations
 

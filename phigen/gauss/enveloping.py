@@ -1,9 +1,11 @@
 """Star algebras of simple Lie algebras without known matrices, as quotients of universal enveloping algebras.
 
-Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S
-is a g-module of symmetric elements such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is spanned by a
-central skew element z, and is only needed for sl(n) and su(n). S is an eigenspace of the Casimir operator on Sym² g.
-The products of elements of g with a, b in g and f in S are
+A star algebra is an associative algebra with an involution *. Its skew elements a (a* = −a) contain the Lie algebra.
+
+Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1.
+S is a g-module of symmetric elements (f* = f) such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is
+spanned by a central skew element z, and is only needed for sl(n) and su(n). S is an eigenspace of the Casimir operator
+on Sym² g. The products of elements of g with a, b in g and f in S are
 
     ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a).
 
@@ -150,7 +152,7 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
         eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices of trace 0
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): symmetric elements are the skew-Hamiltonian matrices of trace 0
+        # sp(2n): S has the matrices of trace 0 that the involution leaves unchanged (skew-Hamiltonian matrices)
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:

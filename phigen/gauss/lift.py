@@ -1,11 +1,12 @@
 """Frames of group elements. With them, momenta are quadratic forms with constant coefficients.
 
-Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra. On this copy, the functional x̃ of
-`phigen.gauss.star_algebra` is x̃(q) = y·Im q with a vector y. There is a quaternion F, called the *frame*, with y = F*
-k F. Let U = FG be the unknown in place of the group element G. Then the momenta are x̃(GaG*) = k̃(UaU*) with k̃(q) =
-(Im q)_3, which does not depend on x. The value of U at the end of a step is the frame at the start of the next step.
-Left multiplication by F commutes with the vector field, so a step with the unknown U is the step with the unknown G. F
-is determined only up to a left factor exp(tk), and all choices give the same step.
+Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra (an associative algebra with an involution
+*). On this copy, the functional x̃ of `phigen.gauss.star_algebra` is x̃(q) = y·Im q with a vector y. There is a
+quaternion F, called the *frame*, with y = F* k F. Let U = FG be the unknown in place of the group element G. Then the
+momenta are x̃(GaG*) = k̃(UaU*) with k̃(q) = (Im q)_3, which does not depend on x. The value of U at the end of a step
+is the frame at the start of the next step. Left multiplication by F commutes with the vector field, so a step with the
+unknown U is the step with the unknown G. F is determined only up to a left factor exp(tk), and all choices give the
+same step.
 """
 
 from __future__ import annotations

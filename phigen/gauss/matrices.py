@@ -127,8 +127,8 @@ def _doubled(a: SparseMatrix, n: int, field: Field) -> SparseMatrix:
 def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatrix | None:
     """Return an invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices m.
 
-    For each form in a basis of the solutions, the symmetric part and the skew part are tried. Returns None if no such
-    part is invertible.
+    For each form in a basis of the solutions, the symmetric part and the skew part are tried. Returns None if none of
+    these parts is invertible.
     """
     rows: list[dict[int, Scalar]] = []
     for m in matrices:

@@ -1,12 +1,12 @@
 """Star algebras of quaternionic type: quaternions over a commutative algebra K, with the Lie algebra g as skew
 elements.
 
-The star algebra is A = K ⊕ g. Its products are ab = β(a, b) + ½[a, b] for a, b in g, and K commutes with all elements.
-β is symmetric, and its values are linear maps of g that commute with the bracket. A exists if there is a β with [[a,
-b], c] = 4(β(b, c)a − β(a, c)b). K is the algebra of linear maps that the values of β and the identity generate.
-Examples of A are: the quaternions for so(3), the 2×2 matrices for sl(2), the quaternions with complex coefficients for
-so(3,1), and the quaternions with dual coefficients for se(3). Heisenberg algebras have β = 0, and so(4) gives two
-copies of so(3).
+A star algebra is an associative algebra with an involution *. Its skew elements a have a* = −a. Here the star algebra
+is A = K ⊕ g. Its products are ab = β(a, b) + ½[a, b] for a, b in g, and K commutes with all elements. β is symmetric,
+and its values are linear maps of g that commute with the bracket. A exists if there is a β with [[a, b], c] = 4(β(b,
+c)a − β(a, c)b). K is the algebra of linear maps that the values of β and the identity generate. Examples of A are: the
+quaternions for so(3), the 2×2 matrices for sl(2), the quaternions with complex coefficients for so(3,1), and the
+quaternions with dual coefficients for se(3). Heisenberg algebras have β = 0, and so(4) gives two copies of so(3).
 """
 
 from __future__ import annotations

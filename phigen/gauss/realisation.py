@@ -56,11 +56,11 @@ class AlgebraBlock:
     """Part of a system: the coordinates ``indices``, which have the brackets of the Lie algebra ``lie``. The unknown is
     a group element G.
 
-    The functions x_i + ``shift``_i are a momentum map of the star algebra ``algebra``. If ``central`` is set, the last
-    basis element of the Lie algebra has no coordinate: its value is the constant 1. ``ideal`` lists the basis elements
-    of a square-zero ideal, or is () if there is none. Functionals replace the components of G along the ideal
-    (`phigen.gauss.square_zero`). ``copies`` lists copies of the quaternions if G starts from a frame F in place of 1
-    (`phigen.gauss.lift`), else it is ().
+    The functions x_i + ``shift``_i are a momentum map of the star algebra ``algebra`` (see
+    `phigen.gauss.star_algebra`). If ``central`` is set, the last basis element of the Lie algebra has no coordinate:
+    its value is the constant 1. ``ideal`` lists the basis elements of a square-zero ideal, or is () if there is none.
+    Functionals replace the components of G along the ideal (`phigen.gauss.square_zero`). ``copies`` lists copies of the
+    quaternions if G starts from a frame F in place of 1 (`phigen.gauss.lift`), else it is ().
     """
 
     indices: tuple[int, ...]
@@ -244,8 +244,8 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
 
 
 def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | None:
-    """Return the part for some coordinates with the brackets of a Lie algebra; None if phigen knows no star algebra for
-    it.
+    """Return the part for some coordinates with the brackets of a Lie algebra. Returns None if phigen knows no star
+    algebra for the Lie algebra (see `phigen.gauss.star_algebra`).
     """
     last = len(indices)
     if all(set(row) <= {last} for row in lie.constants.values()):  # all brackets are constant
@@ -261,7 +261,9 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return a star algebra whose skew elements (a* = −a) contain the Lie algebra; None if phigen knows none."""
+    """Return a star algebra for a Lie algebra: an associative algebra with an involution *, whose skew elements (a* =
+    −a) contain the Lie algebra. Returns None if phigen knows none.
+    """
     return quaternionic(lie) or of_matrices(lie) or enveloping(lie)
 
 

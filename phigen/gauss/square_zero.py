@@ -1,4 +1,5 @@
-"""Square-zero ideals of star algebras. They reduce the number of unknowns of a step.
+"""Square-zero ideals of star algebras (associative algebras with an involution *). They reduce the number of unknowns
+of a step.
 
 Let A = B ⊕ N with a subalgebra B and an ideal N such that N² = 0, B* = B and N* = N. Write group elements as G = g + n,
 with g in B and n in N. Let x̃ be the functional of `phigen.gauss.star_algebra`. For b in B and c in N, the momenta are

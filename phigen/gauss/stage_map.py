@@ -93,8 +93,8 @@ def frame_symbol(place: int) -> str:
 
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
-    """Return the state of a system at a stage as a function of the unknowns; ``pace`` multiplies ∇H and covector
-    forces.
+    """Return the state of a system at a stage as a function of the unknowns. ``pace`` is a factor of ∇H and of covector
+    forces, such as the rate g of a monitor.
     """
     plain_indices = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
     scaled = tuple(i for part in realisation.logarithms for i in part.indices)

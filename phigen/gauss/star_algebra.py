@@ -22,7 +22,7 @@ Vector = dict[int, Scalar]
 
 @dataclass(frozen=True)
 class StarAlgebra:
-    """Star algebra in a basis.
+    """Star algebra in a basis: an associative algebra with an involution a ↦ a*.
 
     ``table[i, j]`` is the product of the basis elements i and j; products that are 0 have no entry. ``star[i]`` is the
     image of basis element i under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a that
@@ -85,7 +85,7 @@ class StarAlgebra:
         """Yield the axioms by which coordinates are a momentum map: the name of each axiom, and an iterator of
         residuals.
 
-        An axiom holds if all residuals are 0, that is, vectors without entries.
+        An axiom holds if all its residuals are 0. A residual is a sparse vector, and the vector 0 has no entries.
         """
         n, unit = range(self.dimension), self.field.one
         units = [{i: unit} for i in n]

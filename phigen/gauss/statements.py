@@ -129,8 +129,8 @@ def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], E
 
 
 def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
-    """Decide whether coordinates with the brackets of a Lie algebra are a quadratic momentum map on the star algebra of
-    the group.
+    """Decide whether coordinates with the brackets of a Lie algebra are a quadratic momentum map on its star algebra
+    (see `phigen.gauss.star_algebra`).
     """
     coordinate_names = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra

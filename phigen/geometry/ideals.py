@@ -28,8 +28,8 @@ def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
     """Return projections e_1, …, e_r onto ideals whose direct sum is the algebra: Σ e_a = 1, and e_a e_b = 0
     for a ≠ b.
 
-    Each projection is a matrix by rows in the basis E_i; its column j is the image of E_j. The identity is the only
-    result if the algebra is indecomposable or large, or if its structure constants contain parameters.
+    Each projection is a matrix in the basis E_i, as a list of rows; its column j is the image of E_j. The identity is
+    the only result if the algebra is indecomposable or large, or if its structure constants contain parameters.
     """
     n = algebra.dimension
     parts = [_identity(n)]

@@ -51,9 +51,7 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of the implicit equation of a stage. The fields that the function reads are
-        those of the unknown y.
-        """
+        """Return the function of a kernel of a stage. The fields that the function reads are those of the unknown y."""
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
@@ -92,8 +90,8 @@ class LatticeLoops:
     def transposed(
         self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the function of a transposed kernel. It is the transpose of a kernel of a ``sweep`` or, without
-        ``sweep``, of the implicit equation of a stage.
+        """Return the function of a transposed kernel: of a kernel of a ``sweep`` or, without ``sweep``, of a kernel of
+        a stage.
 
         ``gather`` has the sums that the kernel reads. The kernel recomputes, by the inverse flow, the values that
         ``fields`` had before the sweep.

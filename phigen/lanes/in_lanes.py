@@ -73,9 +73,10 @@ class Blocks:
     """Implicit steps that are solved together: consecutive steps of a trajectory, or a group of members.
 
     ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if the kernels call no library
-    function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. ``path`` has
-    the derivatives of paths; the Taylor series of these derivatives have at most ``slope_terms`` terms. ``room`` is the
-    number of values in each lane that a group of members needs, without the values of predictors.
+    function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. For steps
+    along paths, ``path`` has the recurrences for the derivatives of a path; their Taylor series have at most
+    ``slope_terms`` terms. ``room`` is the number of values in each lane that a group of members needs, without the
+    values of predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -135,8 +136,8 @@ class Traces:
     """Paths in lanes, for the reverse pass of an integration that takes one step at a time.
 
     ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack. ``calls`` are the
-    functions that the kernels call. ``path`` has the derivatives of paths; the Taylor series of these derivatives have
-    at most ``slope_terms`` terms.
+    functions that the kernels call. ``path`` has the recurrences for the derivatives of a path; their Taylor series
+    have at most ``slope_terms`` terms.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -396,11 +397,10 @@ def _packs(program: Program, kernels: Sequence[Kernel]) -> Packs | None:
 
 
 def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel], stored: int) -> Packs:
-    """Return the packs with transposes, if these can be computed in lanes too; else the packs unchanged.
+    """Return the packs with transposes, or unchanged if the transposes cannot be computed in lanes.
 
-    ``stored`` is the number of bytes of the stored states for one pack. For several packs, the size of the stored
-    states grows as the square of their number. ``reverse_packs`` becomes the largest number of packs whose states fit
-    on the stack.
+    The states that the reverse pass stores need ``stored`` bytes for one pack, and k² times as much for k packs.
+    ``reverse_packs`` becomes the largest number of packs whose states fit on the stack.
     """
     transposes = transposes if program.offers("members") else ()
     ops = operations(transposes)

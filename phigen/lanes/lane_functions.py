@@ -1,4 +1,6 @@
-"""Elementary functions in loops over SIMD lanes. Some of them prevent a compiler from vectorising a loop."""
+"""Versions of elementary functions for loops over SIMD lanes. Functions without such a version prevent a compiler from
+vectorising a loop.
+"""
 
 from __future__ import annotations
 

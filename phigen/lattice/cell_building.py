@@ -130,7 +130,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line for the header of generated files that names all sizes which do not fit the colours of
+    """Return one line for the header of generated files. It names all sizes that do not fit the colours of
     sites.
 
     The line says that a splitting with this number of ``colours`` needs other sizes, and gives examples. If there are
@@ -142,7 +142,7 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line for the header of generated files that names all sizes which need a boundary seam.
+    """Return one line for the header of generated files. It names all sizes that need a boundary seam.
 
     A seam is needed if a size is not a multiple of the period of the colours. For each size, the line also names a
     multiple near the size.

@@ -243,7 +243,8 @@ def _axes(cell: Cell, positions: Sequence[str], mass: str) -> tuple[tuple[tuple[
     """Return the pairs (position, momentum or velocity) of all axes. The second result is true for momenta, false for
     velocities.
 
-    Raises `_OtherFormError` if the brackets or the kinetic energy have another form.
+    Raises `_OtherFormError` unless each position has a constant bracket with exactly one momentum or velocity, and the
+    energy of a site is its kinetic energy.
     """
     partners: dict[str, list[tuple[str, Expression]]] = {f: [] for f in cell.fields}
     for (f, g), entry in cell.bracket.items():

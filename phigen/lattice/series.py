@@ -112,7 +112,7 @@ class SeriesPlan:
         yield from ()
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:
-        """Return the kernels of the implicit equation of a stage and, if ``tangent``, the kernels of its derivative."""
+        """Return the kernels of a stage and, if ``tangent``, the kernels of its derivative."""
         size = len(self.middle)
         values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
         relax = site_kernel(

@@ -16,9 +16,11 @@ from xml.etree.ElementTree import Element
 LINE = 31.0
 #: Indentation of continued lines in LaTeX, and its width in em.
 INDENT, INDENTED = "\\quad ", 1.0
-#: Fraction of a line that may stay empty if this avoids a break one level deeper inside parentheses.
+#: Fraction of a line that may stay empty if a break there avoids a break inside one more pair of parentheses.
 _SHORTER = 0.35
-#: A break between factors is as bad as a break before a sign that is this number of levels deeper in parentheses.
+#: A line is broken before a sign +, − or =, or between two factors. A break before a sign is worse, the more pairs of
+#: parentheses enclose the sign. A break between factors counts like one before a sign that this number of further pairs
+#: encloses.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6

@@ -42,8 +42,8 @@ Trilinear = dict[tuple[int, int, int, int], Expression]
 
 @dataclass(frozen=True)
 class _Escape:
-    """Indices i, a, b for which E_a E_i E_b + E_b E_i E_a is not in the algebra. Then no Cayley bi-realisation
-    exists.
+    """Indices i, a, b of basis matrices of a Lie algebra for which E_a E_i E_b + E_b E_i E_a is not in the algebra.
+    Then no Cayley bi-realisation exists.
     """
 
     i: int

@@ -26,7 +26,8 @@ class Dual:
 
 
 def dual_of(system: System) -> Dual | None:
-    """Return the coordinates and the covector of a linear or affine π as elements of a Lie algebra and its dual.
+    """Return the coordinates x and the covector p of a linear or affine π as a `Dual`: x is in the dual of a Lie
+    algebra, and p in the algebra.
 
     Returns None for any other π.
     """

@@ -151,8 +151,8 @@ class _Trivialised:
         self._columns = [[self._field.convert(e) for row in m for e in row] for m in slopes]
 
     def solved(self, *, left: bool) -> list[list[Expression]]:
-        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows; R and L are the trivialised derivatives of the
-        map τ.
+        """Return R⁻¹ if ``left``, else L⁻¹, as a list of rows. The matrices R and L are the trivialised derivatives of
+        the map τ.
 
         The entries c_j of column i solve Σ_j (∂τ/∂p_j) c_j = E_i τ. For L⁻¹ the right-hand side is τ E_i.
         """

@@ -24,7 +24,7 @@ SOURCE = 100_000
 
 
 def document(material: Material) -> str:
-    """Return the HTML of the page with the content ``material``."""
+    """Return the HTML of the page; ``material`` is its content."""
     spec = material.compilation.spec
     solvers = script(material.live) if material.live and material.live.solvers else ""
     return page.page(

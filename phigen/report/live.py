@@ -30,7 +30,7 @@ ORDERS, MOST = (2, 4), 200_000
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
-HELP = """Drag one of the pictures in space, or use the arrow keys, to turn both; + and − zoom; 0 resets the view.
+HELP = """Drag a three-dimensional picture, or use the arrow keys, to turn both; + and − zoom; 0 resets the view.
 Between steps the curves are interpolated. The panel chooses the {} at its start: at equal work, the errors of RK4
 should become visibly larger than those of phigen within ten seconds, and phigen should also work with twice the step.
 With smaller steps both methods come closer to the exact solution, and over short times RK4 is often closer."""
@@ -92,11 +92,12 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """Return the solvers in JavaScript (order → text), and "". If there can be no solvers, return {} and the
-    reason.
+    """Return the solvers in JavaScript as {order: text}, and the reason if there are none. The reason is "" if there
+    are solvers.
 
-    The orders are the order of the page, and ``orders``. ``spec`` replaces the spec of the compilation, from which it
-    may differ only in its observables.
+    There is a solver for the order of the compilation, and for each of ``orders`` if it can be compiled and the page
+    does not become too large. ``spec`` replaces the spec of the compilation, from which it may differ only in its
+    observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)

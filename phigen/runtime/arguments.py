@@ -37,8 +37,7 @@ class Beginning:
     ``values``.
 
     ``draws`` selects the random numbers. ``first`` are the values of the initial attitude and position, None for the
-    default. ``level`` is the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); None stands for
-    −H(x).
+    default. ``level`` is the energy level e of a lattice with a monitor; None stands for −H(x).
     """
 
     x: Floats
@@ -53,8 +52,8 @@ class Beginning:
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
     """Return the energy level e that the argument ``gauge`` sets, and remove this argument.
 
-    Only lattices with a monitor (rescaled time: dt = g dτ) have this argument. If the argument is missing, returns
-    None; e is then −H of the initial state. Raises `ValueError` unless the value is one finite number.
+    Only lattices with a monitor have this argument. If the argument is missing, returns None; e is then −H of the
+    initial state. Raises `ValueError` unless the value is one finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None

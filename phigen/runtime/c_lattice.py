@@ -95,8 +95,8 @@ _UPDATES_PER_CALL = 1 << 26
 
 
 class SweepStage(ctypes.Structure):
-    """Description of one sweep of a step: which coordinates and planes it reads, and which coordinates it
-    changes.
+    """Description of one sweep of a step: which coordinates and planes it reads, and which coordinates it changes. A
+    plane is the set of all sites with one index of the first axis.
 
     A sweep updates all sites. To update the planes a … b − 1, it reads the planes a − ``behind`` … b − 1 + ``ahead``.
     ``read`` and ``changed`` are bit masks with a bit for each coordinate.
@@ -260,19 +260,15 @@ class CLatticeSession:
         return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
-        """Return the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ); else
-        {}.
-        """
+        """Return the energy level and the physical time of a lattice with a monitor; else {}."""
         return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
+        """Return the physical time since the start, for a lattice with a monitor."""
         return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); by default e is −H of the
-        initial state.
-        """
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         self._set_clock(np.array([level, *self._clock()["passed"][1:]]))
 
     def _set_clock(self, clock: Floats) -> None:
@@ -295,8 +291,7 @@ class CLatticeSession:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
-        finite.
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         self._move("set_state", x)
 

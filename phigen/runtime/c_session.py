@@ -23,8 +23,8 @@ _ALIGNMENT = 64  # bytes: the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):
-    """Cotangents that a reverse pass updates: of the state, of the parameters and, with a monitor (rescaled time: dt =
-    g dτ), of the energy level e.
+    """Cotangents that a reverse pass updates: of the state, of the parameters and, with a monitor, of the energy level
+    e.
     """
 
     state: Floats

@@ -131,8 +131,7 @@ class CSolver:
         """Raise `BackendError` if no step is possible with the parameters. Called for ensembles without
         members.
 
-        With a monitor g (rescaled time: dt = g dτ) nothing is checked, since the sign of g depends on the initial
-        state.
+        With a monitor g nothing is checked, since the sign of g depends on the initial state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -309,7 +308,7 @@ class CSolver:
     ) -> tuple[Floats, Floats, Floats]:
         """Return the result of `pullback` for one part of an ensemble.
 
-        Each call of C processes all members of this part over one segment of the run.
+        The run is divided into segments. One call of the C function processes one segment for all members of this part.
         """
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)

@@ -85,13 +85,11 @@ class LatticeSession(Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
+        """Return the physical time since the start, for a lattice with a monitor."""
         ...
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); by default e is −H of the
-        initial state.
-        """
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
@@ -122,8 +120,7 @@ class LatticeSession(Protocol):
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes); time, step number and parameters are unchanged.
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
-        finite.
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         ...
 
@@ -212,10 +209,10 @@ class LatticeTrajectory:
     trajectory crosses the section of the run. ``retried`` are the numbers of those steps that failed and were repeated
     as several smaller steps.
 
-    With a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau``
-    is None without a monitor. If the run continues another run, ``joined`` is true and ``tau`` None.
-    ``structure_factor`` and ``correlated`` are the results of the keys ``spectrum`` and ``correlation`` of a run;
-    ``origin`` is the provenance text for files.
+    With a monitor (dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without
+    a monitor. If the run continues another run, ``joined`` is true and ``tau`` None. ``structure_factor`` and
+    ``correlated`` are the results of the keys ``spectrum`` and ``correlation`` of a run; ``origin`` is the provenance
+    text for files.
     """
 
     t: Floats
@@ -451,8 +448,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         Frames are the states after every ``stride``-th step and after the last. With ``until`` in place of ``steps``,
         the last step is shortened to end at that time. A step that fails is repeated as 2, 4, …, up to 2**retry smaller
-        steps. Together, these are a Poisson map, but not the map of one whole step. With a monitor (rescaled time: dt =
-        g dτ), ``h`` is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
+        steps. Together, these are a Poisson map, but not the map of one whole step. With a monitor (dt = g dτ), ``h``
+        is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
 
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
         numbers of a site are a function of ``seed``, ``member``, the site, and the number of the step, where ``step0``

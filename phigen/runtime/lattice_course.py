@@ -77,7 +77,7 @@ class LatticeCourse:
         return self.sites.state()
 
     def time(self) -> float:
-        """The physical time since the start for a lattice with a monitor (rescaled time: dt = g dτ); else NaN."""
+        """The physical time since the start for a lattice with a monitor; else NaN."""
         return self.sites.time() if self.solver.interface.monitored else math.nan
 
     def element(self) -> Floats:
@@ -109,8 +109,7 @@ class LatticeCourse:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
-        finite.
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         self._anchor = {}
         self.sites.place(x)
@@ -123,8 +122,8 @@ class LatticeCourse:
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Replace the parameters. The state, the time and the random numbers are unchanged.
 
-        Compensation terms and predictors are dropped, as at a new start. With a monitor (rescaled time: dt = g dτ), the
-        energy level e becomes −H of the state. Raises `StepError` if no step is possible with the parameters.
+        Compensation terms and predictors are dropped, as at a new start. With a monitor, the energy level e becomes −H
+        of the state. Raises `StepError` if no step is possible with the parameters.
         """
         sites, steps, draws = self.sites, self.steps, self.at.draws
         clock = Clock(self._clock.after(steps), self._clock.h, steps)
@@ -137,7 +136,7 @@ class LatticeCourse:
         self._sites, self._clock, self._before, self._anchor = changed, clock, steps, {}
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes this integration again."""
+        """Return the arrays from which `restored` recreates the state of this integration."""
         if self._sites is None and not self._ahead:
             return dict(self._arrays)
         sites, clock = self.sites, self._clock
@@ -181,7 +180,7 @@ class ObservedCourse(Retrying):
         return cast("LatticeCourse", self.session).sites
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes this integration again."""
+        """Return the arrays from which `restored` recreates the state of this integration."""
         parts = np.array([self._extra, *self.retried])
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 

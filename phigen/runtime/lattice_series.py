@@ -60,8 +60,8 @@ class LatticeSeries:
         return self.solver.ends_of(self)
 
     def save(self, path: str | Path) -> None:
-        """Write a ``.csv`` with t and the columns, or a ``.npz`` that also has the first and last state and the
-        parameters.
+        """Write a ``.csv`` with the times and all recorded columns, or a ``.npz`` that also has the first and last
+        state and the parameters.
 
         The arrays of an ``.npz`` are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h
         and parameter_NAME. Raises `ValueError` for other suffixes.

@@ -29,9 +29,8 @@ class LiveSession:
     Properties of its present state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
     name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to
     ``x`` change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters`
-    changes parameters. With a monitor (rescaled time: dt = g dτ), each of these changes sets the energy level e to −H
-    of the present state. ``copy()`` returns an independent session. A session that was pickled and loaded continues
-    with the same bits.
+    changes parameters. With a monitor, each of these changes sets the energy level e to −H of the present state.
+    ``copy()`` returns an independent session. A session that was pickled and loaded continues with the same bits.
     """
 
     def __init__(
@@ -81,8 +80,8 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Store new parameters. Without a monitor (rescaled time: dt = g dτ), also store the clock ``begin``, which
-        counts the time from now on.
+        """Store new parameters. Without a monitor, also store the clock ``begin``, which counts the time from
+        now on.
         """
         self.parameters = values
         if not self.solver.interface.monitored:

@@ -27,8 +27,8 @@ class Piece:
 
     ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step. ``x``
     (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). ``passed`` (rows,) is the physical
-    time since the start if there is a monitor (rescaled time: dt = g dτ), and NaN otherwise. ``turned`` (rows, numbers)
-    are attitudes and positions.
+    time since the start if there is a monitor, and NaN otherwise. ``turned`` (rows, numbers) are attitudes and
+    positions.
     """
 
     numbers: Floats

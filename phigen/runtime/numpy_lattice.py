@@ -54,7 +54,7 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def _begin(self) -> None:
-        """Set the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ).
+        """Set the energy level and the physical time of a lattice with a monitor.
 
         Raises `ValueError` if g ≤ 0 at the start.
         """
@@ -127,19 +127,15 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return the energy level and the physical time of a lattice with a monitor (rescaled time: dt = g dτ); else
-        {}.
-        """
+        """Return the energy level and the physical time of a lattice with a monitor; else {}."""
         return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, for a lattice with a monitor (rescaled time: dt = g dτ)."""
+        """Return the physical time since the start, for a lattice with a monitor."""
         return float(sum(self._sites.clock))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor (rescaled time: dt = g dτ); by default e is −H of the
-        initial state.
-        """
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -154,8 +150,7 @@ class NumpyLatticeSession:
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (coordinates, *sizes).
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not
-        finite.
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())

@@ -44,8 +44,7 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Flo
 def _refused(module: Any, members: Members) -> list[int]:
     """Return the numbers of the members for which no step is possible.
 
-    Either their parameters are not admissible, or the monitor g (rescaled time: dt = g dτ) is not positive at their
-    start.
+    Either their parameters are not admissible, or the monitor g is not positive at their start.
     """
     values = module._values(dict(members.parameters))
     refused = set(map(int, module._refused(values, members.x0))) if hasattr(module, "_refused") else set()

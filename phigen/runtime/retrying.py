@@ -29,7 +29,9 @@ class Retrying(Forwarding[Followed]):
         return self.session.steps - self._extra
 
     def advance(self, h: float, steps: int) -> None:
-        """Make ``steps`` whole steps. Raises `BackendError` if a step fails for every number of smaller steps."""
+        """Make ``steps`` whole steps. A step that fails is repeated as 2, 4, … smaller steps. Raises `BackendError` if
+        it fails for every number of smaller steps.
+        """
         while steps > 0:
             begin = self.steps
             try:

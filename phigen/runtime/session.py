@@ -47,7 +47,7 @@ class Followed(Course, Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start if there is a monitor (rescaled time: dt = g dτ); else NaN.
+        """Return the physical time since the start if there is a monitor; else NaN.
 
         Without a monitor, the time follows from the number of steps.
         """
@@ -67,8 +67,8 @@ class Session(Followed, Protocol):
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         """Replace all parameters; state, time, attitude and random numbers are unchanged.
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H of the state. Raises `BackendError` for
-        values that are not admissible.
+        With a monitor, the energy level e becomes −H of the state. Raises `BackendError` for values that are not
+        admissible.
         """
         ...
 
@@ -104,8 +104,7 @@ class Session(Followed, Protocol):
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (DIM,); time, step number and parameters are unchanged.
 
-        With a monitor (rescaled time: dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if ``x`` is
-        not admissible.
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if ``x`` is not admissible.
         """
         ...
 

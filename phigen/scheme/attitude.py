@@ -111,11 +111,11 @@ def _path_element_kernel(group: Group, system: System) -> Kernel:
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
-    """Return the group element of the covector p, minus 1.
+    """Return the outputs of a kernel for the group element of the covector p.
 
-    The group element is the exponential of p, or the Cayley transform of p if ``cayley``. The exponential of a matrix
-    is not computed here, but later by the generated code. In this case the result is p, followed by a bound for the
-    squared size of the matrix.
+    The group element is the exponential of p, or the Cayley transform of p if ``cayley``. The outputs are its entries,
+    minus those of the identity. The exponential in a group of matrices is an exception: another kernel computes it. For
+    that kernel, the outputs are the components of p, and a bound for the squared norm of the matrix of p.
     """
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]

@@ -50,7 +50,7 @@ class Role(Enum):
 
     @property
     def is_stage(self) -> bool:
-        """Whether the kernel belongs to the implicit equation of a stage on a lattice."""
+        """Whether the kernel belongs to a stage on a lattice."""
         is_sweep_or_observable = self.is_sweep or self.is_observable
         return (
             self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS)
@@ -73,7 +73,7 @@ class Role(Enum):
 
     @property
     def is_transposed_stage(self) -> bool:
-        """Whether the kernel is the transpose of a kernel for the implicit equation of a stage on a lattice."""
+        """Whether the kernel is the transpose of a kernel of a stage on a lattice."""
         return self in (Role.TRANSPOSED_RELAX, Role.TRANSPOSED_ADVANCE)
 
     @property

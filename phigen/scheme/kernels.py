@@ -169,7 +169,8 @@ def _entries(name: str, n: int) -> tuple[str, ...]:
 
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
-    """Return elimination as two kernels, which factorise the matrix once and then solve for many right-hand sides.
+    """Return Gaussian elimination as two kernels: one factorises the matrix once, the other then solves for many
+    right-hand sides.
 
     The second kernel also multiplies each solution by the derivative of the increment, whose pattern is ``slope``.
     """

@@ -207,7 +207,7 @@ class PathTangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeSweepPolicy(Policy):
-    """Sweeps over a lattice that solve the implicit equation of a stage, for steps with a generating function."""
+    """Sweeps over a lattice that solve a stage, for steps with a generating function."""
 
     differences: int = count(4, "number of differences in the predictor of a stage")
     patience: int = count(10, "sweeps before Newton's method may replace slow sweeps")

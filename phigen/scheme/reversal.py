@@ -81,8 +81,9 @@ def _called_in(value: Expression) -> set[Expression]:
 
 
 def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:
-    """Return a node as a sum of symbols with integer factors, from its arguments in this form; None if it has another
-    form."""
+    """Return a node as a sum of symbols with integer factors. ``args`` are its arguments as sums of this kind. Returns
+    None if the node is no sum of this kind.
+    """
     if node.op == "symbol":
         return {node.value: 1}
     if node.op not in ("add", "sub", "neg") or None in args:

@@ -1,5 +1,5 @@
-"""Kernels for the implicit equation of a stage on a lattice. Some transpose the equation. Another one computes
-derivatives for the diagonal blocks of the Newton matrix, one block for each site.
+"""Kernels for a stage of a lattice. Some transpose its equation. Another one computes derivatives for the diagonal
+blocks of the Newton matrix, one block for each site.
 """
 
 from __future__ import annotations

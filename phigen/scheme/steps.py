@@ -579,7 +579,7 @@ class Ends:
 
     @property
     def of_all(self) -> bool:
-        """Whether every bond or pair contributes to both of its sites: no end and no colour is selected."""
+        """Whether every bond or pair contributes to both of its sites. Then ``end`` and ``chosen`` are ""."""
         return not (self.end or self.chosen)
 
 

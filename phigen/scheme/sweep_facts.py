@@ -17,7 +17,7 @@ MAX_DIAGONALS = 64
 
 
 def reach(step: Sweeps) -> int:
-    """Return the distance, in sites, of the farthest neighbour that the implicit equation of a stage reads.
+    """Return the distance, in sites, of the farthest neighbour that a stage reads.
 
     The lattice has one axis.
     """
@@ -120,8 +120,8 @@ def takes(program: Program, step: Sweeps) -> bool:
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
     """Return for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
 
-    If the loop of the next flow adds them (`takes`), only the first flow of a step needs separate loops: it comes last
-    in the reverse pass.
+    If the function `takes` returns true, the loop of the next flow adds them. Only the first flow of a step then needs
+    separate loops, because no flow follows it in the reverse pass.
     """
     first = step.schedule.flows[0][0] if takes(program, step) else None
     return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
@@ -148,7 +148,9 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether open ends let a row receive cotangents from rows that it does not read."""
+    """Whether a row may receive cotangents from rows that it does not read. This is so if an axis other than the last
+    one has open ends.
+    """
     return any(step.sites.open[:-1])
 
 

@@ -140,11 +140,11 @@ def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression)
 
 
 def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
-    """Return a transposed kernel that recomputes fields as two kernels, for cotangents and for fields.
+    """Divide a transposed kernel that recomputes fields into two kernels: one for the cotangents, and one for the
+    fields before the sweep.
 
-    The second kernel computes the fields before the sweep, and only this kernel reads the sums over bonds or pairs. So
-    these sums can be computed in one loop with the cotangents of the bonds or pairs. Returns None if the cotangents
-    depend on these sums, or if no fields are recomputed.
+    Only the second kernel reads sums over bonds or pairs. So the loop that passes the cotangents through these sums can
+    also compute the sums. Returns None if the cotangents depend on the sums, or if no fields are recomputed.
     """
     cotangent_outputs = tuple(o for o in transpose.outputs if o.name != STATE_BEFORE)
     state_outputs = tuple(o for o in transpose.outputs if o.name == STATE_BEFORE)

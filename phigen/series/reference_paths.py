@@ -64,9 +64,10 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """Return a `Source`: the function that maps a degree to Taylor coefficients in p, for the end of a path.
+    """Return a `Source`: a function that maps a degree to the Taylor coefficients in p of one endpoint of a
+    path.
 
-    The end is α = m(0) for ``time`` 0, and β = m(1) for ``time`` 1.
+    The ``time`` 0 selects the start α = m(0), and 1 the end β = m(1).
     """
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)

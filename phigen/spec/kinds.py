@@ -383,8 +383,8 @@ class Record(Kind):
         value.
 
         Reading the value declares the names in it and reports its errors. The value is None if it cannot be read. It is
-        None too if the unknown key is a word of another program (`MEANT`), because values often have another form
-        there.
+        None too if the unknown key is a word of another program (`MEANT`), because other programs often write values
+        differently.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)

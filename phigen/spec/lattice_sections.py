@@ -67,7 +67,8 @@ def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, 
 
 
 def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
-    """Return the lattice with the kinds of its Casimirs, and with further ``parts`` that were read after it.
+    """Return the lattice with the kinds of its Casimirs, and with the fields ``parts``, which are read after the rest
+    of the lattice.
 
     If the spec states no kind, a density without neighbours is a Casimir at every site, and the sum of any other
     density over the sites is a Casimir.

@@ -174,7 +174,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
 def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     """Return the range of ``seed`` as a list of one axis, or [] after reported errors.
 
-    A value on this axis is the number of a random draw: each draw has other initial values, parameters and noise.
+    A value on this axis is the index of a random draw: each draw has other initial values, parameters and noise.
     """
     if isinstance(value, list):
         draw_counts = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]

@@ -49,8 +49,9 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """Return the motion along a vector field: for each coordinate that moves, linear equations if there are any, else
-    its rate."""
+    """Return the motion along a vector field. Coordinates for which there are linear equations get these equations. The
+    others get their rates; coordinates that are constant get nothing.
+    """
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}
     rows: dict[Monomial, Row] = {}

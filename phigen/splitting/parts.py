@@ -111,7 +111,8 @@ def _candidates(
     """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
     The lists differ in their terms, in this order: terms as written; squares of sums as single terms; motions as single
-    terms; sums by blocks of π; terms after subtraction of companions; and sums of groups of terms.
+    terms; sums by blocks of π; terms after subtraction of companions (Casimirs and similar functions); and sums of
+    groups of terms.
     """
     yield terms
     ring = conflicts.ring
@@ -155,7 +156,7 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """Yield lists of terms after multiples of companions have been subtracted, if this reduces the number of
+    """Yield lists of terms from which multiples of companions have been subtracted, if this reduces the number of
     parts.
 
     Companions are Casimirs and similar functions; see `phigen.splitting.regrouping`.

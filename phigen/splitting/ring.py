@@ -171,9 +171,9 @@ class Ring:
 
 
 def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of a system with H, π and the functions in ``further``.
+    """Return the ring that contains H, π and the functions ``further`` of a system.
 
-    The time and the ``symbols`` are additional static variables.
+    The time and the ``symbols`` are additional variables of the ring, which do not depend on the state.
     """
     further_expressions = list(further)
     roots = [system.hamiltonian, *further_expressions, *(e for row in system.poisson for e in row)]

@@ -14,9 +14,9 @@ from phigen.symbolic.tower import Poly, rational
 def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Poly]]:
     """Yield the free rigid bodies in H, each with its Hamiltonian as an element of the ring.
 
-    A body is a sum of squares of three coordinates. These have the brackets of so(3), up to positive factors, and no
-    brackets with other coordinates. No two of the three moments of inertia may be equal for all values of the
-    parameters.
+    The Hamiltonian of a body is a sum of squares of three coordinates. These coordinates have the brackets of so(3), up
+    to factors of the same sign, and no brackets with other coordinates. No two of the three moments of inertia may be
+    the same function of the parameters.
     """
     supports = [{*ring.support(t.element)} for t in terms]
     for triple in combinations(range(len(ring.coordinates)), 3):

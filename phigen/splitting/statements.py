@@ -181,8 +181,9 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
 def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the flow of Kepler motions or of a rigid body.
 
-    All expressions vanish under three conditions. π∇H is the vector field of the motion. The increments are given by
-    the known formula for this motion. The identities that prove the formula hold.
+    All expressions vanish under three conditions. The vector field π∇H of the flow is that of the motion. The
+    increments are those of the known formula for this motion. The identities from which this formula is derived are
+    true.
     """
     names = system.coordinates
     field = flow.vector_field(system)

@@ -28,7 +28,7 @@ CORRECTIONS, MOST_ORDER = 2, 6
 #: doubled to find the largest step size. HALVINGS: number of times that this size is then halved for the measurement.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
 #: ROUNDING: changes of H̃ below this fraction of the largest term of H are rounding errors. ASYMPTOTIC: if H changes by
-#: more than this, in units of the energy, the steps are too large to determine an order.
+#: more than this, relative to the `ModifiedHamiltonian.unit`, the steps are too large to determine an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
 
 
@@ -53,7 +53,7 @@ class ModifiedHamiltonian:
     def errors(self, rows: Floats, h: float) -> Floats:
         """Return |H̃(x_n) − H̃(x_0)| for H̃ with 0, 1, … corrections, as an array (corrections + 1, rows).
 
-        ``rows`` are the states x_n after steps of size h. The errors are in units of the energy.
+        ``rows`` are the states x_n after steps of size h. The errors are relative to the `unit` of the energy at x_0.
         """
         values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
         terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
@@ -67,9 +67,11 @@ class ModifiedHamiltonian:
         return unit
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
-        """Return the largest changes of H̃ with 0, 1, … corrections in a run from x, as an array (corrections + 1,).
+        """Return the largest changes of H̃ with 0, 1, … corrections in a run from x, as an array (corrections +
+        1,).
 
-        The run has ``steps`` steps of size h. Changes are in units of the energy. Raises `StepError` if a step fails.
+        The run has ``steps`` steps of size h. Changes are relative to the `unit` of the energy at x. Raises `StepError`
+        if a step fails.
         """
         changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
         if not np.isfinite(changes).all():

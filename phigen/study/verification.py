@@ -199,7 +199,7 @@ def verify(
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
     """Run the groups of checks, and return all results.
 
-    ``groups`` maps titles to functions that make the checks. The progress display shows each group as a stage.
+    ``groups`` maps titles to functions that make the checks. While a group runs, the progress display shows its title.
     """
     results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:

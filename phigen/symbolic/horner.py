@@ -25,8 +25,8 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
 
 
 def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return the result of `horner`, for terms whose monomials are `Powers`. The pairs of a monomial are sorted by
-    index.
+    """Return the polynomial of `horner`, for terms whose monomials are `Powers`. The caller sorts the pairs of each
+    monomial by index.
     """
     left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO

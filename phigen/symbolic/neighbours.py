@@ -54,7 +54,9 @@ class Neighbours:
         return f"{name}[{','.join(index)}]"
 
     def place(self, symbol_name: str) -> Place:
-        """Return the name and the offset of a symbol. Raises `KeyError` for a symbol without a value at sites."""
+        """Split a symbol such as ``x[i+1]`` into the name ``x`` of the quantity and the offset of the site. Raises
+        `KeyError` for a symbol without a value at sites.
+        """
         match = _NEIGHBOUR.fullmatch(symbol_name)
         base = match["name"] if match else symbol_name
         if base not in self.names:

@@ -65,8 +65,8 @@ class Curve:
     def cost(self, accuracy: float) -> float:
         """Return the cost of the method for an accuracy, in nanoseconds per unit of simulated time.
 
-        If no measured step reaches the accuracy, the cost is extrapolated from the smallest step by the order. It is
-        infinite if rounding errors make the accuracy impossible.
+        If no measured step reaches the accuracy, the cost is extrapolated from the measurement with the smallest step,
+        by the order of the method. The cost is infinite if rounding errors make the accuracy impossible.
         """
         return cheapest_step(self.points, accuracy, self.order)[1]
 

@@ -131,7 +131,9 @@ class Tuner:
         return curve
 
     def peers(self) -> list[Curve]:
-        """Measure the classical methods with several steps, and return their curves; [] if there is no time for it."""
+        """Measure the classical methods with several steps, and return their curves. Returns [] if there is no time for
+        it.
+        """
         current = next(iter(self.tried.values()))
         if self._race is None and current.seconds > self.clock.left(COMPARED):
             return []

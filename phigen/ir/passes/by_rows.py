@@ -1,6 +1,6 @@
-"""Lowering by rows, for C: functions run over the sites of a row segment.
+"""Lowering by rows, for C: a row function runs over the sites of a row segment.
 
-For each array, they receive pointers to the row of the segment and to neighbouring rows.
+For each array, it receives pointers to the row of the segment and to neighbouring rows.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""Lowering by rows of functions on the level of sites: sweeps, stages, observables, and sums over bonds or pairs.
+"""Lowering of functions on the level of sites to row functions: sweeps, stages, observables, and sums over bonds or
+pairs.
 
-The resulting functions run over the sites of a row segment; see `phigen.ir.passes.by_rows`.
+A row function runs over the sites of a row segment; see `phigen.ir.passes.by_rows`.
 """
 
 from __future__ import annotations
@@ -105,8 +106,8 @@ def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Stat
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return the function that evaluates, by rows, a kernel of the implicit equation of a stage. If ``adds``, it adds
-    its outputs to the arrays of results, otherwise it assigns them.
+    """Return the row function that evaluates a kernel of a stage. If ``adds``, it adds its outputs to the arrays of
+    results, otherwise it assigns them.
     """
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 
@@ -114,7 +115,8 @@ def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *
 def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
-    """Return a function by rows that stores its results in the arrays of a ``member`` of the row record.
+    """Return a row function that stores its results in the arrays to which the member ``member`` of the row record
+    points.
 
     ``names`` maps the numbers of the arrays to the names of the pointers to them.
     """
@@ -128,8 +130,8 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its version
-    by rows.
+    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its row
+    function.
 
     ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments follow ``coef``
     and ``row``. They may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction in which
@@ -152,12 +154,12 @@ class BondLoop:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """The parameters of the function by rows."""
+        """The parameters of the row function."""
         return (*[p for p in self.function.parameters if p == "coef"], "row", *self.arguments)
 
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
-    """Return the function by rows of a density, an energy or the vector field. It first calls the functions ``calls``,
+    """Return the row function of a density, an energy or the vector field. It first calls the functions ``calls``,
     which compute sums over bonds or pairs.
 
     ``apart`` is the distance in memory between successive values of one site in the output.
@@ -171,7 +173,9 @@ def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], a
 def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Function:
-    """Return the function by rows of an observable, with inner loops that sum over the bonds of each site."""
+    """Return the function that evaluates an observable row by row. For each site, inner loops sum over the bonds of the
+    site.
+    """
     loop, observed = function.loop, function.loop.stores
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
@@ -223,9 +227,9 @@ def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
 
 
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
-    """Return the function by rows that sums over the bonds of each site.
+    """Return the row function that sums over the bonds of each site.
 
-    It assigns the sums if it is the ``first`` function that computes them, else it adds to the present values.
+    It assigns the sums if it is the ``first`` function that computes them. Otherwise it adds to the present values.
     """
     reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
     rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.function.loop.stores)
@@ -285,7 +289,7 @@ def bonds_of(
 
 
 def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
-    """Return the function by rows that sums over all other sites, for each site of a row segment."""
+    """Return the row function that computes, for each site of a row segment, sums over all other sites."""
     rows = rows_of(bond_loop.function, layout)
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.function.loop.stores]
     arrays = {g.symbol: (WRITTEN, gathered(k)) for k, g in enumerate(sums)}

@@ -1,5 +1,5 @@
-"""Lowering by rows of transposed functions. A site writes only its own elements, so that threads have no write
-conflicts.
+"""Lowering of transposed functions to functions that run over row segments. A site writes only its own elements, so
+that threads have no write conflicts.
 
 A site adds to its own cotangents directly. Its contributions to the cotangents of other sites are stored in arrays, one
 array for each kind of contribution. In a second loop, each site adds the contributions that its neighbours have stored
@@ -82,7 +82,8 @@ class Transpose:
 
 
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
-    """Return the first loop of a transposed function by rows.
+    """Return the first of the two functions over a row segment that compute a transposed function; see
+    `handing`.
 
     With ``vectors``, sums over sites are accumulated in SIMD registers.
     """
@@ -142,8 +143,8 @@ def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.V
 
 
 def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
-    """Return the second loop of a transposed function: each site adds the contributions that its neighbours have
-    stored.
+    """Return the second of the two functions that compute a transposed function. In it, each site adds the
+    contributions that its neighbours have stored for it.
     """
     pointers, added = _added_up("handed", handed, layout)
     head = [_pointer("bar", "bar", k, layout) for k in dict.fromkeys(h.base for h in handed)]
@@ -242,7 +243,7 @@ class BondTranspose:
 
 
 def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
-    """Return the transpose of a function for sums over bonds or pairs, by rows."""
+    """Return the transpose of a function for sums over bonds or pairs, as a function over a row segment."""
     updates, first = transpose.updates, transpose.sums_from
     arrays = [ir.fixed(f"handed_{first + k}") for k in range(transpose.count)]
     reading = Reading(seeds={HERE: arrays}, here=transpose.end, oriented=transpose.oriented)
@@ -266,8 +267,8 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
 def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over sites, with an inner loop over the bonds of each site.
 
-    Contributions to a sum over all sites are first added up at each site. This shortens the chain of additions that
-    depend on each other.
+    For a sum over all sites, the contributions of the bonds are first added up at each site. Then the additions for
+    different sites do not depend on each other.
     """
     updates = transpose.updates
     at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}

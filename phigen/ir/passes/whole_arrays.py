@@ -70,8 +70,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
 
     def stage(self, function: ir.Function) -> ir.Function:
-        """Return a kernel of the implicit equation of a stage as a function of the unknown y and of the state at the
-        start of the stage.
+        """Return a kernel of a stage as a function of the unknown y and of the state at the start of the stage.
 
         The parameter for y has the name x.
         """
@@ -124,10 +123,10 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def transposed_stage(self, function: ir.Function, seed: str) -> ir.Function:
-        """Return the transpose of a kernel of the implicit equation of a stage.
+        """Return the transpose of a kernel of a stage.
 
-        It is a function of the cotangent ``seed`` that returns two cotangents: of the unknown y of the equation, and of
-        the state at the start of the stage.
+        It is a function of the cotangent ``seed``. It returns two cotangents: of the unknown y of the stage, and of the
+        state at the start of the stage.
         """
         zeros, both = ir.Called("zeros_like", (X,), NP), (BAR, ir.fixed("start_bar"))
         body = [

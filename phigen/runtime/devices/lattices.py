@@ -62,9 +62,7 @@ class DeviceLattice(NumpyLattice):
 
     @cached_property
     def monitoring(self) -> Any:
-        """The generated NumPy module that computes the durations of flows, for a lattice with a monitor (rescaled time:
-        dt = g dτ).
-        """
+        """The generated NumPy module that computes the durations of flows, for a lattice with a monitor."""
         return monitoring_module(self._text, self.interface.name)
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:

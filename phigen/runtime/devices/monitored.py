@@ -1,4 +1,4 @@
-"""Lattices with a monitor (rescaled time: dt = g dτ), integrated on devices.
+"""Lattices with a monitor, integrated on devices.
 
 The duration of each flow follows from the energy of a part of H, which the device sums over the sites.
 """
@@ -15,7 +15,7 @@ from phigen.runtime.modules import load_module
 
 
 class MonitoredSession(DeviceLatticeSession):
-    """A session of a lattice with a monitor (rescaled time: dt = g dτ): steps are equal in τ, not in time t.
+    """A session of a lattice with a monitor (dt = g dτ): steps are equal in τ, not in time t.
 
     The duration of a flow depends on one number, which the device sends to the host.
     """
@@ -31,9 +31,7 @@ class MonitoredSession(DeviceLatticeSession):
         """Do nothing. The energy level is computed at the end of ``__init__``, when the arrays on the device exist."""
 
     def _hold_level(self) -> None:
-        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g (rescaled time: dt = g dτ)
-        is not positive there.
-        """
+        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g is not positive there."""
         with np.errstate(all="ignore"):
             try:
                 self._sites.level = self._monitoring._level(self._sites, None)

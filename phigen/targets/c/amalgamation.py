@@ -30,8 +30,9 @@ _PREFIX = re.compile(r"\b(?:phi|PHI)_")
 class Amalgam:
     """Assembler of the C code of one solver.
 
-    ``switches`` are the features of the solver, and ``printed`` are the files that were printed for it, by name. All
-    numbers have the type ``real``. ``headers`` collects the headers of the C library that are included.
+    ``switches`` are the features of the solver, and ``printed`` are the files that were printed for it, by name.
+    ``real`` is the floating-point type of the code. ``headers`` collects the headers of the C library that are
+    included.
     """
 
     name: str

@@ -35,10 +35,10 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Cost model of blocks, in which several steps are solved together. In the time in which a solver evaluates one step
-#: alone, a block makes PASSES iterations for each of its steps. Blocks that call library functions are not vectorised,
-#: and make PASSES_OF_CALLS iterations. Blocks of steps along paths have the same number, since they also compute
-#: derivatives of paths, which a step alone does not need.
+#: Cost model of blocks, in which several steps are solved together. One iteration of a block evaluates each of its
+#: steps once. The constants say how many iterations of a block cost as much, per step, as one evaluation of a step
+#: alone. PASSES is for vectorised blocks. PASSES_OF_CALLS is for two cases: blocks that call library functions are not
+#: vectorised, and blocks of steps along paths also compute derivatives, which a step alone does not need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
@@ -69,9 +69,10 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 
 
 def unrestricted(program: Program, code: str) -> str:
-    """Return code that compilers without ``restrict`` accept as well.
+    """Return code that compilers accept which refuse ``restrict``: those of C++, and Microsoft's.
 
-    ``restrict`` remains in loops over lanes and sites only: it makes no other code faster.
+    The word is removed from code that it does not make faster. It remains in the profile ``fast``, and in loops over
+    lanes or sites. There, a macro removes the word for these compilers.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")

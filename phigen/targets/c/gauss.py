@@ -27,8 +27,8 @@ LOOP_SOLVED = 5e-19
 
 
 def policy(*, single: bool, staged: bool) -> GaussPolicy:
-    """Return the thresholds of a Gauss method. ``staged`` says that its stages are in SIMD lanes, ``single`` that the
-    solver has single precision.
+    """Return the thresholds of the iteration that solves the stages of a Gauss method. ``staged`` says that the stages
+    are in SIMD lanes, ``single`` that the solver has single precision.
     """
     usual = POLICIES["gauss_policy"]
     assert isinstance(usual, GaussPolicy)

@@ -774,7 +774,7 @@ def definitions(switches: Mapping[str, bool]) -> Iterator[str]:
 
 
 def names() -> frozenset[str]:
-    """Return the names of all phrases, without their parameters."""
+    """Return the names of all phrases (macros of the C runtime), without their parameters."""
     return frozenset(f"PHI_{phrase.partition('(')[0]}" for choice in ALL for phrase in choice.phrases)
 
 

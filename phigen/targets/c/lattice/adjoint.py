@@ -5,8 +5,7 @@ threads can work on a traversal. In the first traversal, each site computes its 
 values that it has read. It adds contributions to its own cotangents, and stores contributions to other sites in arrays,
 called ``handed``. In the second traversal, each site adds the contributions that other sites have stored for it. On
 grids, the second traversal can be merged with the first traversal of the next flow of the reverse pass; see
-`phigen.scheme.sweep_facts.takes`. Kernels of the implicit equation of a stage have two traversals as well; see
-`stage_kernels`.
+`phigen.scheme.sweep_facts.takes`. Kernels of a stage have two traversals as well; see `stage_kernels`.
 """
 
 from __future__ import annotations

@@ -36,7 +36,8 @@ class Layout(RowLayout):
     """
 
     halo: int = 0
-    # whether the code has kernels of variations; without them, the solver takes differences of sweeps
+    # whether the code has kernels of derivatives along variations (tangent vectors of the fields); without these
+    # kernels, the solver takes differences of sweeps
     slopes: bool = True
 
     @property
@@ -55,14 +56,14 @@ class Layout(RowLayout):
 
     @property
     def partners(self) -> Partners:
-        """The kernels of sums over bonds or pairs. Kernels of variations of sums are left out unless the code has
-        kernels of variations.
+        """The kernels of sums over bonds or pairs. Kernels of derivatives of sums along variations are left out if
+        ``slopes`` is false.
         """
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))
 
     def gathered(self, kernel: Kernel) -> Gather:
-        """Return the sums over bonds or pairs that a kernel of the implicit equation of a stage reads."""
+        """Return the sums over bonds or pairs that a kernel of a stage reads."""
         return self.partners.varied if kernel.reads_variations else self.partners.field
 
     @property

@@ -78,7 +78,7 @@ def share(densities: Kernel) -> int:
 
 @dataclass(frozen=True)
 class RowLoops:
-    """Builder of the loops over sites of one lattice, by rows."""
+    """Builder of the loops over the sites of one lattice. Each loop runs over a row segment."""
 
     layout: Layout
 

@@ -101,7 +101,7 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     """Return the number of arrays over the sites in the memory of a solver, including the fields and parameters."""
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
-        # y before and after a sweep; without kernels of variations, a perturbed y as well
+        # y before and after a sweep; without kernels of derivatives along variations, a perturbed y for differences
         stage = 2 if layout.slopes else 3
         stage += len(program.fractions) * _differences(program) * has["SWEEP_PREDICTORS"]
         stage += (

@@ -118,7 +118,7 @@ class _PartLoops:
 
     @property
     def varied(self) -> bool:
-        """Whether the parts update variations of fields, not the fields."""
+        """Whether the parts update variations (tangent vectors) of fields, not the fields."""
         return self.rows is None
 
     @property
@@ -354,7 +354,7 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
 
 
 def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
-    """Yield the text of the loops, and of the row driver, of a kernel of the implicit equation of a stage.
+    """Yield the text of the loops, and of the row driver, of a kernel of a stage.
 
     The driver of the equation also applies the kernel ``end``, which updates x at the end of a stage.
     """
