@@ -333,7 +333,7 @@ def _expect_names(system: System) -> None:
     code."""
     problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
     problems += [
-        _malformed(name, "letters, digits and _, not starting with a digit")
+        _malformed(name, "a name consists of letters, digits and _, and does not start with a digit")
         for name in (*system.coordinates, *system.times, *system.parameter_names)
         if not re.fullmatch(IDENTIFIER, name)
     ]
@@ -345,7 +345,7 @@ def _expect_names(system: System) -> None:
         raise SpecError(diagnostics)
 
 
-_HINT = "lower-case letters, digits and _, starting with a letter, at most 31"
+_HINT = "a spec name consists of at most 31 lower-case letters, digits and _, and starts with a letter"
 
 
 def _malformed(name: str, hint: str) -> tuple[str, str]:

@@ -449,7 +449,7 @@ def bounded(spec: Spec) -> Iterator[None]:
     try:
         yield
     except OverflowError as error:
-        hint = "fewer terms, lower powers or a lower order; scheme: splitting needs no series"
+        hint = "use fewer terms, lower powers or a lower order; or use scheme: splitting, which needs no series"
         raise LimitError([spec.diagnostic(("hamiltonian",), f"the spec needs {error}", hint)]) from error
 
 

@@ -75,9 +75,9 @@ def _expect_covered(program: Program, spec: Spec) -> None:
     """
     refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
-        refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
+        refusals.append((("noise",), "certificates do not cover noise", "certify a spec without noise"))
     if program.single:
-        refusals.append((("solver",), "certificates are of C in double precision", "leave out real: float"))
+        refusals.append((("solver",), "certificates cover only C in double precision", "leave out real: float"))
     if with_frames(program) is not program:
         message = f"certificates do not cover the form of Gauss steps that profile fast has at order {program.order}"
         refusals.append((("order",), message, "set order: 12, or profile: small"))

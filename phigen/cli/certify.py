@@ -57,7 +57,7 @@ WIDTH = 0.01
     metavar="N",
     default=1000.0,
     show_default=True,
-    help="Divide a box if its bound exceeds N units in the last place.",
+    help="Divide the box of coordinates where the bound exceeds N units in the last place.",
 )
 @click.option(
     "--boxes",
@@ -66,7 +66,7 @@ WIDTH = 0.01
     metavar="N",
     default=1000,
     show_default=True,
-    help="Largest number of boxes into which the box may be divided.",
+    help="Largest number of boxes into which the box of coordinates may be divided.",
 )
 @click.option(
     "--samples",
@@ -74,7 +74,7 @@ WIDTH = 0.01
     metavar="N",
     default=100,
     show_default=True,
-    help="Steps of the compiled C that are compared with the exact map.",
+    help="Number of steps of the compiled C that are compared with the exact map.",
 )
 @click.option(
     "-o", "--output", "folder", metavar="DIR", default="certified", show_default=True, help="Folder to write."

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 @click.option("--orders", metavar="N,…", default="2,4", show_default=True, help="Orders of the methods.")
 @click.option(
     "--equal", type=click.Choice(["step", "work"]), default="step", show_default=True,
-    help="Give all methods the step of the run, or the CPU time that the setting of the spec needs with this step.",
+    help="What all methods share: the step of the run, or the CPU time that the setting of the spec needs "
+    "with this step.",
 )  # fmt: skip
 @click.option("--horizon", type=float, metavar="T", help="Length of the run in time.  [default: as in the spec]")
 @settings_option

@@ -122,7 +122,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
     return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
-            f"sizes: {m}, which the colours of the splitting require",
+            f"sizes: {m}, as the splitting of this lattice requires",
             f"for example {m.fitting}; scheme: series works for every size",
         )
         for m in wrong_sizes

@@ -206,7 +206,9 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     choice = planned(spec, SplitHamiltonian(flows), *requested, lambda: () if plain else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
-        message = "scheme splitting: noise is not offered on graphs whose sites must be coloured"
+        message = (
+            "scheme splitting: noise is not offered on graphs where neighbouring sites are moved one after another"
+        )
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series applies to it")])
     if cell.time:  # on a coloured graph, the time advances in the last flow
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
@@ -423,7 +425,7 @@ def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
 def _expect_supported(cell: Cell, spec: Spec) -> None:
     diagnostics, locations = [], spec.locations
     if cell.bond_bracket and cell.relation == PAIRS:
-        message = "brackets between the sites of pairs are not compiled"
+        message = "brackets between the sites of pairs are not offered"
         diagnostics.append(Diagnostic(message, locations.get(("poisson",))))
     unsupported = ["modified_hamiltonian"] if spec.extras.modified_hamiltonian else []
     unsupported += ["reconstruct"] if ("reconstruct",) in locations else []

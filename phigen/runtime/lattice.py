@@ -1021,7 +1021,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                     f"{argument} has {size} sites along {axis}; neighbours and brackets need {least} or more"
                 )
             if size % period:
-                message = f"{argument} has {size} sites along {axis}; the colours of sites need multiples of {period}"
+                message = f"{argument} has {size} sites along {axis}; the splitting needs multiples of {period}"
                 hint = "compile from a spec that has a run of this size, or with scheme='series'"
                 raise ValueError(f"{message}; {hint}")
         if not np.isfinite(copy).all():

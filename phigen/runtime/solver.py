@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
 
 _ADVICE = {
-    "NO_CONVERGENCE": "the inner iteration did not converge; a smaller step helps",
-    "SINGULAR": "the inner equation is singular; a smaller step helps",
+    "NO_CONVERGENCE": "the equations of the implicit step were not solved; a smaller step helps",
+    "SINGULAR": "the equations of the implicit step are singular; a smaller step helps",
     "NOT_FINITE": "the state left the range of the formulas; a smaller step helps, unless the solution ends here",
 }
 

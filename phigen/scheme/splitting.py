@@ -213,12 +213,13 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
     for flow in flows if monitor else ():
         if flow.exponentials:
             message = (
-                "monitor: log makes the time of a flow depend on the state, but that of {} uses a matrix exponential"
+                "monitor: log makes the time of a flow depend on the state, but the flow of {} uses a matrix "
+                "exponential, which needs a fixed time"
             )
             diagnostic = Diagnostic(
                 message.format(shortened(flow.hamiltonian)),
                 system.locations.get(("monitor",)) or system.locations.get(("hamiltonian",)),
-                "scheme: series offers an expression as monitor for every H",
+                "use scheme: series, which takes an expression as monitor for every H",
             )
             raise SpecError([diagnostic])
 

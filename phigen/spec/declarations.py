@@ -78,7 +78,7 @@ class Declarations:
         density.
         """
         reason = "this expression must be the same for all sites"
-        hint = "a parameter at: sites has a value for each site"
+        hint = "to use a value for each site, declare a parameter {value: …, at: sites}"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
         return {
             n: (f"{reason}; {n!r} depends on the site" if n[:2] != "N_" else f"{reason} and sizes", hint)
@@ -95,7 +95,7 @@ class Declarations:
             return None
         neighbours = self.neighbours
         varying = {n: e for n, e in names.items() if neighbours.places(e)}
-        hint = "an array is declared {value: …, at: sites}"
+        hint = "to give a parameter a value at each site, declare it as {value: …, at: sites}"
         same = {n: (f"{n!r} is the same at all sites", hint) for n in names if n not in varying}
         bonds = {
             n: (f"{n!r} belongs to the bond, not to its ends", f"write {n} without an index") for n in same if ends
@@ -114,7 +114,7 @@ class Declarations:
         indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
         domain = "a pair" if self.relation == "pairs" else "a bond"
-        messages = {n: (f"{n!r} needs an end of {domain}", f"write {n}[a] or {n}[b]") for n in local}
+        messages = {n: (f"{n!r} does not say at which end of {domain}", f"write {n}[a] or {n}[b]") for n in local}
         common_names = {n: e for n, e in names.items() if n not in local}
         common_names |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
         refused = self.refused | self._counters() | messages | ({} if dated else self._timeless())
@@ -132,7 +132,13 @@ class Declarations:
             index = self.coordinate(node)
             return None if index is None else (self.coordinates[index], self.neighbours.origin)
         symbols_of_coordinates = {c: symbol(c) for c in self.coordinates}
-        scope = AllowedNames({}, {c: (f"{c!r} has no end", f"write {c}[a] or {c}[b]") for c in symbols_of_coordinates})
+        scope = AllowedNames(
+            {},
+            {
+                c: (f"{c!r} does not say at which end of a bond", f"write {c}[a] or {c}[b]")
+                for c in symbols_of_coordinates
+            },
+        )
         if self.lattice is not None:
             refused = {n: (f"{n!r} is not a coordinate", "") for n in (*self.parameters, *self.definitions)}
             scope = AllowedNames(
@@ -174,9 +180,13 @@ class Declarations:
         """Return the time, and the definitions that depend on the time. Each has the error (message, hint) for
         its use.
         """
-        hint = "only the Hamiltonian, invariants, sections and exact solutions may"
-        refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
-        return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
+        hint = "the time is allowed in H, forces, noise, invariants, observables, sections, stop and exact solutions"
+        refused = {
+            n: (f"this expression must not depend on the time, but {n!r} does", hint) for n in sorted(self.dated)
+        }
+        return refused | (
+            {self.time: (f"this expression must not depend on the time {self.time!r}", hint)} if self.time else {}
+        )
 
     def constants(self, value_name: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
         """Return the names that a constant may use: parameters, and definitions that depend on parameters only.
@@ -333,7 +343,11 @@ def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
         message = (
             f"lattice: {counted(len(boundary), 'boundary', 'boundaries')} for {counted(len(nodes), 'axis', 'axes')}"
         )
-        reader.problems.add(message, reader.locations["lattice", "boundary"], "a single word holds for all axes")
+        reader.problems.add(
+            message,
+            reader.locations["lattice", "boundary"],
+            "give one word for all axes, or a list with one word for each axis",
+        )
     graph = raw.get("graph")
     if not (axes or graph or "pairs" in raw):  # after an error, which was reported when the key was read
         return Lattice(("i",), ("periodic",))
@@ -347,8 +361,8 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         *raw.get("parameters", {}),
         *raw.get("definitions", {}),
     } - {*CONSTANTS}
-    hint_text = "the value of a parameter is a number"
-    numbers = AllowedNames({}, {n: (hint_text, f"what depends on {n!r} can be a definition") for n in reserved})
+    hint_text = "the value of a parameter must be a number"
+    numbers = AllowedNames({}, {n: (hint_text, f"write what depends on {n!r} under definitions") for n in reserved})
     for name, (key, value) in raw.get("parameters", {}).items():
         if not declared.declare(key, "parameter"):
             continue
@@ -359,14 +373,16 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
             number, array = None, values(entry, declared)
         elif entry is not None and not isinstance(entry, Scalar):
             number = declared.reader.problems.add(
-                f"the value of the parameter {name!r} is a number", key.location, "arrays are at: sites or at: bonds"
+                f"the value of the parameter {name!r} must be a number",
+                key.location,
+                "for a value at each site or bond, add at: sites or at: bonds",
             )
         else:
             number = declared.number(entry, numbers)
         positive, nonnegative = options.get("positive", False), options.get("nonnegative", False)
         if positive and nonnegative:
             declared.reader.error(
-                key, f"the parameter {name!r} is positive, so it is nonnegative too", "give one of them"
+                key, f"the parameter {name!r} is positive, so it is nonnegative too", "give only one of them"
             )
         bounded = Parameter(name, Fraction(1), positive, nonnegative=nonnegative)
         if number is not None and bounded.refuses(number):

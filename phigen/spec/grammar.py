@@ -94,7 +94,7 @@ class AllowedNames:
         if name.lower() in ("nan", "inf", "infinity"):
             return f"{shown(name)} is not a finite number", ""
         if name == "t":
-            return "the name 't' is not declared", "where things depend on the time, time: t declares its name"
+            return "the name 't' is not declared", "if t is the time, add time: t to the spec"
         return f"the name {shown(name)} is not declared", did_you_mean(name, [*self.names, *CONSTANTS])
 
 
@@ -106,21 +106,21 @@ _TOKEN = re.compile(
     r"|(?P<other>(?s:.)))"
 )
 _CHARACTER_HINTS = {
-    "^": "powers are written **",
-    "−": "the minus sign is -",
-    "–": "the minus sign is -",
-    "·": "products are written *",
-    "×": "products are written *",
-    "²": "powers are written **2",
-    "³": "powers are written **3",
-    "√": "square roots are written sqrt(…)",
-    "π": "the constant is written pi",
-    "{": "an expression is a scalar: use ( )",
+    "^": "write powers with **",
+    "−": "write the minus sign as -",
+    "–": "write the minus sign as -",
+    "·": "write products with *",
+    "×": "write products with *",
+    "²": "write squares with **2",
+    "³": "write cubes with **3",
+    "√": "write square roots as sqrt(…)",
+    "π": "write the constant as pi",
+    "{": "parentheses of expressions are ( )",
     "=": "an expression has no = sign",
-    ".": "names have no parts: there is no attribute access",
-    "'": "expressions are not Python",
-    '"': "expressions are not Python",
-    ":": "expressions are not Python",
+    ".": "a name contains no point",
+    "'": "expressions are formulas of numbers, names and functions, not Python",
+    '"': "expressions are formulas of numbers, names and functions, not Python",
+    ":": "expressions are formulas of numbers, names and functions, not Python",
 }
 
 #: Characters that users may write instead of operators, with the operators. After the error, the parser continues as if
@@ -145,7 +145,7 @@ def tokens(source: str, report: Report) -> list[Token] | None:
     """Return the tokens of an expression; the last one has the kind ``end``. None after a reported error."""
     if len(source) > limits.EXPRESSION_LENGTH:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
-        report(message, 0, "name parts of it under definitions", limit=True)
+        report(message, 0, "give names to parts of the expression, under definitions", limit=True)
         return None
     result: list[Token] = []
     reported: set[str] = set()
@@ -232,13 +232,17 @@ class Parser:
         self.nodes += 1
         if self.nodes > limits.EXPRESSION_NODES:
             message = f"the expression has more than {limits.EXPRESSION_NODES} numbers, names and operators"
-            raise self.abandon(message, token.index, "name parts of it under definitions", limit=True)
+            raise self.abandon(
+                message, token.index, "give names to parts of the expression, under definitions", limit=True
+            )
 
     def nested(self, rule: Callable[[], Expression], token: Token) -> Expression:
         self.depth += 1
         if self.depth > limits.EXPRESSION_DEPTH:
             message = f"the expression is nested deeper than {limits.EXPRESSION_DEPTH} levels"
-            raise self.abandon(message, token.index, "name parts of it under definitions", limit=True)
+            raise self.abandon(
+                message, token.index, "give names to parts of the expression, under definitions", limit=True
+            )
         result = rule()
         self.depth -= 1
         return result
@@ -259,15 +263,19 @@ class Parser:
         if token.text in ("[", "]"):
             return self.bracket(token)
         if token.text in (")", ","):
-            hint = "there is no ( before it" if token.text == ")" else "decimals have a point"
+            hint = "there is no ( before it" if token.text == ")" else "write decimals with a point, such as 1.5"
             return self.abandon(f"unexpected {token.text!r}", token.index, hint)
         if previous.kind == "number" and token.text.startswith("_"):
-            return self.abandon(f"unexpected {shown(token.text)} after a number", token.index, "digits are not grouped")
+            return self.abandon(
+                f"unexpected {shown(token.text)} after a number", token.index, "write numbers without _, such as 1000"
+            )
         if token.text[0] in "<>":
             return self.abandon(
-                f"unexpected {token.text!r}", token.index, "comparisons stand in if(a < b, …), in observables and stop"
+                f"unexpected {token.text!r}",
+                token.index,
+                "comparisons are allowed only inside if(a < b, …), in observables and stop",
             )
-        hint = f"products are written with *: {previous.text[-20:]}*{token.text[:20]}"
+        hint = f"write products with *: {previous.text[-20:]}*{token.text[:20]}"
         return self.abandon(f"an operator is missing before {shown(token.text)}", token.index, hint)
 
     def sum(self) -> Expression:
@@ -313,7 +321,7 @@ class Parser:
             return call("exp", exponent)
         if base.is_number and base.value < 0:
             message = f"the negative number {base.value} has no power with an exponent that varies"
-            self.report(message, start.index, "the exponent must be an integer")
+            self.report(message, start.index, "use an integer as exponent")
             return base
         return call("power", base, exponent)
 
@@ -336,13 +344,13 @@ class Parser:
         if token.text in ("[", "]"):
             raise self.bracket(token)
         previous = self.tokens[self.position - 2].text if self.position > 1 else ""
-        hint = "powers are written **; there is no //" if token.text == "/" and previous == "/" else ""
+        hint = "write powers with **; there is no //" if token.text == "/" and previous == "/" else ""
         raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
 
     def bracket(self, token: Token) -> _AbandonedError:
         """Report the token ``[`` or ``]`` where no index may stand, and return the exception to raise."""
         follows = token.text == "[" and self.position and self.tokens[self.position - 1].kind == "name"
-        hint = "neighbours, x[i+1], are for specs with lattice:" if follows else "an expression is a scalar: use ( )"
+        hint = "neighbours, x[i+1], are for specs with lattice:" if follows else "parentheses of expressions are ( )"
         return self.abandon(f"the character {token.text!r} does not belong in an expression", token.index, hint)
 
     def close(self, opening: Token) -> None:
@@ -390,7 +398,7 @@ class Parser:
             guess = did_you_mean(token.text, function_names, OTHER_FUNCTIONS) or "functions are " + ", ".join(
                 function_names
             )
-            hint = f"products are written with *: {token.text}*(…)" if declared else guess
+            hint = f"write products with *: {token.text}*(…)" if declared else guess
             raise self.abandon(f"{shown(token.text)} is not a function", token.index, hint)
         arguments = [] if self.here.text == ")" else [self.nested(self.sum, opening)]
         while arguments and self.accept(","):

@@ -44,7 +44,7 @@ class Indices:
         opening = parser.advance()
         if not (self.ends or self.neighbours.axes):
             message = f"{token.text}[…]: sites of this lattice have no neighbours by index"
-            couples = "hamiltonian: {sites: …, bonds: …}, or pairs:, takes x[a] and x[b]"
+            couples = "in hamiltonian: {bonds: …} or {pairs: …}, write x[a] and x[b] for x at the two sites"
             raise parser.abandon(message, opening.index, couples)
         if self.ends:
             end = self._end(parser, opening)
@@ -80,7 +80,7 @@ class Indices:
 
     def _no_axis(self, token: Token) -> tuple[str, int, str]:
         axes = self.neighbours.axes
-        example = f"an index is an axis and a whole number: [{axes[0]}+1]"
+        example = f"write an axis, then + or - and a whole number: [{axes[0]}+1]"
         if token.kind == "name":
             axes_text = f"{'axes are' if len(axes) > 1 else 'the axis is'} {', '.join(axes)}"
             return f"{shown(token.text)} is not an axis", token.index, did_you_mean(token.text, axes) or axes_text
@@ -107,4 +107,6 @@ class Indices:
         if parser.here.kind == "end":
             raise parser.abandon("this [ is never closed", opening.index)
         message = f"unexpected {shown(parser.here.text)} in an index"
-        raise parser.abandon(message, parser.here.index, "an index is an axis and a whole number" * (not self.ends))
+        raise parser.abandon(
+            message, parser.here.index, "write an axis, then + or - and a whole number" * (not self.ends)
+        )

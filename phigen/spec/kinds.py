@@ -62,7 +62,7 @@ def list_hint(node: Node) -> str:
     """
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
-        return f"{_LISTS}; of names only: [{', '.join(names)}]" if names else _LISTS
+        return f"{_LISTS}; the names alone are written [{', '.join(names)}]" if names else _LISTS
     if isinstance(node, Scalar) and not node.is_null and len(node.text) < 20:
         return f"{_LISTS}, and a list of one is [{node.text}]"
     return _LISTS
@@ -211,7 +211,7 @@ class Boolean(Kind):
 
     def read(self, node: Node, path: Path, reader: Reader) -> bool | None:
         if not isinstance(node, Scalar) or node.boolean is None:
-            hint = "YAML 1.2 has true and false only" if isinstance(node, Scalar) and node.plain else ""
+            hint = "write true or false" if isinstance(node, Scalar) and node.plain else ""
             return self.mismatch(node, path, reader, hint)
         return node.boolean
 
@@ -235,7 +235,7 @@ class ExpressionText(Kind):
         if node.boolean is not None and self.constant:
             return self.mismatch(node, path, reader)
         if _DATE.match(node.text):
-            hint = "as a difference it is written with spaces around -"
+            hint = "if it is a difference, write spaces around -"
             return reader.error(node, f"{label(path)}{shown(node.text)} is a date, not {self.expected}", hint)
         return node
 
@@ -446,7 +446,7 @@ class Record(Kind):
         forms = [name for name in node.entries if name in self.one]
         for name in forms[1:]:
             message = f"{self.what}: {forms[0]} and {name} exclude each other"
-            reader.error(node.entries[name][0], message, "give one of them")
+            reader.error(node.entries[name][0], message, "give only one of them")
         if self.exactly and not forms and not strange and not any(name in node.entries for name in self.instead):
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
         if self.some and not node.entries:

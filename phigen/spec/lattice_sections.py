@@ -41,7 +41,9 @@ def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]
             continue
         if declared.relation != relation_needed:
             declared.reader.error(
-                node, f"hamiltonian: {key} needs {_WANTED[relation_needed]}", "x[i+1] couples sites of a grid"
+                node,
+                f"hamiltonian: {key} needs {_WANTED[relation_needed]}",
+                "on a grid, write x[i+1] for x at the next site",
             )
         else:
             coupling = declared.formula(node, declared.bond_scope(dated=True)) or ZERO
@@ -60,7 +62,7 @@ def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, 
         if "at" in options:
             kinds[name] = options["at"]
             if declared.lattice is None:
-                declared.reader.error(key, f"{name}: at is for specs with lattice:", "give the expression alone")
+                declared.reader.error(key, f"{name}: at is for specs with lattice:", f"write {name}: EXPRESSION")
         if value is not None:
             formulas[name] = value
     return formulas, kinds
@@ -79,10 +81,10 @@ def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapp
 
 #: Keys that runs of lattices do not have, with the hint: the reason, or what to use instead.
 _ABSENT_IN_RUNS = {
-    "box": "phigen show --expand prints an ordinary spec of a few sites, where it is allowed",
-    "exact": "phigen show --expand prints an ordinary spec of a few sites, where it is allowed",
-    "compare": "phigen verify and phigen tune set classical methods beside the solver of a lattice",
-    "members": "sweeps: integrates many members, each with its own path",
+    "box": "phigen show --expand prints an ordinary spec of a few sites, in which this key is allowed",
+    "exact": "phigen show --expand prints an ordinary spec of a few sites, in which this key is allowed",
+    "compare": "phigen verify and phigen tune compare the solver of a lattice with classical methods",
+    "members": "to integrate many members, each with its own noise, add a sweep under sweeps:",
 }
 
 
@@ -112,7 +114,7 @@ def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields
     """
     scope = declared.dated_constants("a number of the lattice")
     at_sites = [name for name, parameter in declared.parameters.items() if parameter.at != "all"]
-    hint = "observables: {{M: {{mean: {}}}}} makes it a number, which may be named here"
+    hint = "declare observables: {{M: {{mean: {}}}}}, and write M in this expression"
     local = [n for n, e in declared.definitions.items() if set(at_sites).intersection(symbols_of(e))]
     several = dict.fromkeys([*declared.coordinates, *fields, *sorted(declared.varying), *at_sites, *local])
     refused = {

@@ -62,12 +62,12 @@ def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> R
     domain, add = entry.get("over", "sites"), declared.reader.problems.add
     place = declared.reader.locations["observables", name, kind]
     if declared.lattice is None:
-        add(f"observables: {kind} is over the sites of a lattice", place, "give the formula alone")
+        add(f"observables: the key {kind} is only for specs with lattice:", place, f"write {name}: FORMULA")
         return None
     relation, declaration = _RELATIONS.get(domain, (declared.relation, ""))
     if relation != declared.relation:
         place = declared.reader.locations["observables", name, "over"]
-        hint = "x[i+1] is a neighbour on a grid" if declared.relation == "grid" else ""
+        hint = "on a grid, write x[i+1] for x at the next site" if declared.relation == "grid" else ""
         add(f"observables: over: {domain} needs {declaration}", place, hint)
         return None
     return Reduction(kind, domain)

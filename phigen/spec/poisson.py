@@ -73,7 +73,7 @@ def _of_neighbours(table: Mapping[str, Any], declared: Declarations) -> dict[tup
             mirrored = base, space.at(key.text, minus(offset))
             if mirrored in brackets and space.shifted([neg(value)], minus(offset))[0] is not brackets[mirrored][1]:
                 first_place = brackets[mirrored][0].location
-                message = f"{{{key.text}, {second_field.text}}} is not written as the negative of its mirror image"
+                message = f"{{{key.text}, {second_field.text}}} is not the negative of its mirror image, as it must be"
                 declared.reader.error(
                     second_field, message, f"that is in line {first_place.line}, column {first_place.column}"
                 )
@@ -98,11 +98,13 @@ def _along_bonds(table: Mapping[str, Any], declared: Declarations) -> dict[tuple
             pair = space.at(*first), space.at(*second)
             if {first[1], second[1]} != {(end,) for end in ENDS}:
                 declared.reader.error(
-                    second_field, "a bracket along a bond couples its two ends, a and b", "x[a] with x[b]"
+                    second_field,
+                    "a bracket along a bond couples its two ends, a and b",
+                    "write a bracket of x[a] and y[b]",
                 )
             elif pair[::-1] in brackets and brackets[pair[::-1]] is not neg(value):
-                message = f"{{{pair[0]}, {pair[1]}}} is not written as the negative of {{{pair[1]}, {pair[0]}}}"
-                declared.reader.error(second_field, message, "give one of them")
+                message = f"{{{pair[0]}, {pair[1]}}} is not the negative of {{{pair[1]}, {pair[0]}}}, as it must be"
+                declared.reader.error(second_field, message, "give only one of them")
             elif pair[::-1] not in brackets:
                 brackets[pair] = value
     return brackets
@@ -121,7 +123,7 @@ def _entries(
     """
     key_path, error_count = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
-        hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix must be square"
+        hint = "give one row for each coordinate" if size == len(declared.coordinates) else "give a square matrix"
         _fail(declared, path, f"{key_path}: expected {counted(size, 'row')}, found {len(rows)}", hint)
     matrix = []
     for i, row in enumerate(rows):
@@ -178,8 +180,8 @@ def _state(
         declared.reader.error(b, f"the bracket of {a.text!r} with itself is always 0", "remove it")
     elif (j, i) in pairs and pairs[j, i][1] is not neg(value):
         first_place = pairs[j, i][0].location
-        message = f"{{{a.text}, {b.text}}} is not written as the negative of {{{b.text}, {a.text}}}"
-        hint = f"the other is in line {first_place.line}, column {first_place.column}; give one of them"
+        message = f"{{{a.text}, {b.text}}} is not the negative of {{{b.text}, {a.text}}}, as it must be"
+        hint = f"the other is in line {first_place.line}, column {first_place.column}; give only one of them"
         declared.reader.error(b, message, hint)
     else:
         pairs[i, j] = b, value
@@ -240,7 +242,7 @@ def _spanned(rows_of_matrices: list[Rows | None], sign: int, declared: Declarati
             declared,
             path,
             f"lie_algebra: {counted(len(rows_of_matrices), 'matrix', 'matrices')} for {counted(n, 'coordinate')}",
-            "one for each coordinate",
+            "give one matrix for each coordinate",
         )
     scope = declared.constants("a matrix of a Lie algebra")
     size = len(rows_of_matrices[0] or ())
@@ -271,7 +273,7 @@ def _basis_index(key: Scalar, declared: Declarations) -> int | None:
     if index < n or declared.incomplete:
         return index
     return declared.reader.error(
-        key, f"there is no basis element {key.text}", f"with {n} coordinates they are E1 to E{n}"
+        key, f"there is no basis element {key.text}", f"with {n} coordinates the basis elements are E1 to E{n}"
     )
 
 
@@ -305,7 +307,7 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
             declared,
             ("product",),
             f"product: {missing_names[0]!r} is in no block",
-            "every coordinate belongs to one block",
+            "write every coordinate in exactly one block",
         )
     complete = tuple((names, form) for names, form in blocks if form is not None)
     return ProductForm(complete) if len(complete) == len(blocks) else None
@@ -325,7 +327,7 @@ def _pullback(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | N
     names = tuple(image)
     forward = [declared.formula(node, declared.scope()) for _, node in image.values()]
     inner_path = (*declared.within, "pullback", "of")
-    inner = declared.inside(inner_path, names, "this structure is in the coordinates of the map and cannot use")
+    inner = declared.inside(inner_path, names, "this structure must use the coordinates that map defines, not")
     form = poisson_form(inner_form, inner)
     backward = _inverse(raw["inverse"], declared, inner) if "inverse" in raw else None
     if form is None or None in forward:
@@ -340,7 +342,7 @@ def _inverse(
         declared.coordinate(key)
     missing_names = [c for c in declared.coordinates if c not in entries]
     if missing_names and not declared.incomplete:
-        return _fail(declared, ("pullback", "inverse"), f"pullback: inverse does not give {missing_names[0]!r}")
+        return _fail(declared, ("pullback", "inverse"), f"pullback: inverse has no formula for {missing_names[0]!r}")
     return tuple(inner.formula(entries[c][1], inner.scope()) or ZERO for c in declared.coordinates if c in entries)
 
 

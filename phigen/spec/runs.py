@@ -41,7 +41,7 @@ def run(
     numbers = declared.numbers()
     step_node = raw.get("step")
     if step_node is not None and step_node.text in _ADAPTING and step_node.text not in numbers.names:
-        hint = "the step size is fixed; monitor: makes steps equal in another time, which adapts them to the motion"
+        hint = "write a number, since the step size is fixed; the key monitor: of the spec adapts steps to the motion"
         _fail(name, "step", f"step: {step_node.text} is not a number", declared, hint)
         step_node = None
     step = declared.number(step_node, numbers)
@@ -57,12 +57,12 @@ def run(
     if interval is not None and interval <= 0:
         _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
     elif interval is not None and "stride" in raw:
-        _fail(name, "every", "every and stride exclude each other", declared, "give one of them")
+        _fail(name, "every", "every and stride exclude each other", declared, "give only one of them")
     row_times = _row_times(name, raw, start, until, step, steps, declared)
     if "direction" in raw and "section" not in raw:
         example = "x1" if declared.lattice is None else "M"
-        hint = f"section: {example} records where {example} passes through 0"
-        _fail(name, "direction", "direction needs a section", declared, hint)
+        hint = f"section: {example}, for example, records where {example} passes through 0"
+        _fail(name, "direction", "direction: the run has no section", declared, hint)
     stride = raw.get("stride", 1)
     if steps is not None and stride > max(steps, 1):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
@@ -127,7 +127,7 @@ def _row_times(
     """Return the times of ``at`` in the order of the run, without repetitions."""
     nodes = raw.get("at") or ()
     if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):
-        _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give one of them")
+        _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give only one of them")
     end = until if until is not None else start + step * steps if step and steps else None
     times = []
     for node in nodes:
@@ -193,7 +193,7 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
     if start_time is not None and (end - start_time) * run_.step < 0:
         place = declared.reader.locations["runs", run_.name, "average", "after"]
         message = f"average: after: {float(start_time):.9g} is not before the end of the run, t = {float(end):.9g}"
-        declared.reader.problems.add(message, place, "the average is over the rows from that time on")
+        declared.reader.problems.add(message, place, "give an earlier time; the rows from this time on are averaged")
 
 
 def crossed(
@@ -214,7 +214,13 @@ def crossed(
 
 def _start(name: str, node: Scalar | None, declared: Declarations) -> Fraction:
     if node is not None and not declared.time:
-        _fail(name, "start", "start: this system has no time", declared, "time: t declares the name of the time")
+        _fail(
+            name,
+            "start",
+            "start: this system does not depend on the time",
+            declared,
+            "add time: t to the spec, with the name of the time",
+        )
     return declared.number(node, declared.numbers()) or Fraction(0)
 
 
@@ -231,9 +237,15 @@ def _steps(
     )
     steps = round(ratio)
     if whole(ratio) is None:
-        _fail(name, "duration", f"the duration {span_text}, not a whole number", declared, f"steps: {max(1, steps)}")
+        _fail(
+            name,
+            "duration",
+            f"the duration {span_text}, not a whole number",
+            declared,
+            f"write steps: {max(1, steps)} in place of duration, or a multiple of the step",
+        )
     elif steps < 1:
-        hint = "a step backwards in time needs a negative duration" if step < 0 else "the duration must be positive"
+        hint = "with a negative step the duration must be negative" if step < 0 else "the duration must be positive"
         _fail(name, "duration", f"the duration {span_text}", declared, hint)
     elif steps > limits.STEPS:
         location = declared.reader.locations["runs", name, "duration"]
@@ -359,7 +371,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     dated = {n: declared.definitions[n] for n in declared.dated - declared.varying}
     time_values = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
     scope = declared.constants("an exact solution", symbols | time_values)
-    hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
+    hints = {c: (scope.refused[c][0], f"write x0_{c} for the initial value of {c}") for c in declared.coordinates}
     # In an exact solution, t always means the time, even if a coordinate is called t; so this name is not refused.
     refused = {n: reason for n, reason in {**scope.refused, **hints}.items() if n not in symbols}
     scope = AllowedNames(scope.names, refused, scope.open)

@@ -59,7 +59,11 @@ def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarati
     """Return whether a run may have ``key``: it needs a grid and stored states. If not, the error is reported."""
     place, add = declared.reader.locations["runs", name, key], declared.reader.problems.add
     if declared.relation != "grid":
-        add(f"{key} needs a grid, and this lattice has no axes", place, "lattice: {axes: [i]} declares one")
+        add(
+            f"{key} needs a grid, and this lattice has no axes",
+            place,
+            "lattice: {axes: [i]} declares a grid of one axis",
+        )
         return False
     record = [node.text for node in raw.get("record") or () if node is not None]
     if record and "state" not in record:

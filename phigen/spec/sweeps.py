@@ -39,7 +39,7 @@ def sweep(
     place = ("sweeps", name)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
     if run not in runs:
-        hint = did_you_mean(run, runs) or "runs: holds the experiments of a spec"
+        hint = did_you_mean(run, runs) or "add the run under runs:"
         _fail((*place, "run"), f"there is no run {shown(run)}" if run else "the spec has no runs", declared, hint)
     entries: dict[str, Any] = {}
     axes: list[Axis] = []
@@ -140,7 +140,11 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         )
         return []
     if name == "start" and name not in (*declared.parameters, *declared.coordinates) and not declared.time:
-        declared.reader.error(key, "over: start: this system has no time", "time: t declares the name of the time")
+        declared.reader.error(
+            key,
+            "over: start: this system does not depend on the time",
+            "add time: t to the spec, with the name of the time",
+        )
         return []
     if isinstance(value, Scalar):
         declared.reader.error(
@@ -163,7 +167,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         axis = Axis(name, (), (first, last), value.get("count", 0), value.get("scale", "linear"))
     lowest = min(axis.values or axis.ends)
     if axis.scale == "log" and lowest <= 0:
-        declared.reader.error(key, f"over: {name} on a logarithmic scale reaches {lowest:g}")
+        declared.reader.error(key, f"over: {name} on a logarithmic scale must be positive, but reaches {lowest:g}")
     parameter = declared.parameters.get(name)
     if parameter is not None and parameter.refuses(lowest):
         message = f"is {parameter.bound} by declaration, but reaches {lowest:g}"
@@ -181,7 +185,7 @@ def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         numbers = tuple(float(n) for n in draw_counts if n is not None)
         return [Axis("seed", numbers)] if len(numbers) == len(value) else []
     if "count" not in value or len(value) > 1:
-        declared.reader.error(key, "over: seed has a count, and no other key", "seed: {count: 10}")
+        declared.reader.error(key, "over: seed must have the key count, and no other key", "seed: {count: 10}")
         return []
     return [Axis("seed", count=value["count"])]
 

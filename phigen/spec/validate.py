@@ -158,7 +158,7 @@ WITHOUT_SERIES = {
 #: Keys that lattices refuse, except with the values that are listed here: they request nothing. Each key has a hint.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
-    "terms": ((), "order: sets the method of a lattice"),
+    "terms": ((), "remove terms; on lattices, order: determines the method"),
     "gauge": (("auto", "none"), "remove gauge: lattices have none"),
     "modified_hamiltonian": ((0,), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
 }
@@ -168,7 +168,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
-        "noise changes H, so e = -H(x0) would not be constant, and in tau its amplitude would depend on the state",
+        "noise changes H, so the energy level e = -H(x0) would not be constant",
         "remove monitor; then all steps have the same size in time",
     ),
     "composition": (
@@ -177,7 +177,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
         "composition: none; with scheme: splitting, all noise comes before and after the composition of the flows of H",
     ),
     "modified_hamiltonian": ((0,), "each step has a Hamiltonian of its own", ""),
-    "terms": ((), "with noise the method is chosen by order", "order: 2"),
+    "terms": ((), "with noise, order: determines the method", "order: 2"),
     "adjoint": ((False,), "gradients of steps with noise are not available", ""),
 }
 #: Keys of runs that are refused with noise, and keys of runs that are allowed with noise only.
@@ -188,7 +188,7 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     _expect_consistent_with_noise(raw, problems, reader)
     for name, (_, run_) in raw.get("runs", {}).items() if not raw.get("observables") else ():
         if run_ and "average" in run_:
-            hint = "observables: {NAME: formula} declares what is averaged"
+            hint = "declare what is averaged as observables: {NAME: formula}"
             problems.add("average: the spec has no observables", reader.locations["runs", name, "average"], hint)
     for key, (harmless, hint) in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
@@ -209,12 +209,12 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
     for key, harmless in SERIES_KEYS.items():
         if key in raw and raw[key] is not None and raw[key] not in harmless:
             message = f"{key} belongs to scheme: series; {how}"
-            problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
+            problems.add(message, reader.locations[key,], f"remove {key}, or remove scheme:")
     solver = raw.get("solver") or {}
     for key in ("tolerance", "max_iterations") if raw["scheme"] == "splitting" and not raw.get("lattice") else ():
         if getattr(solver.get(key), "text", solver.get(key)) not in (None, "auto"):
             message = f"solver: {key} belongs to steps that solve equations; {how}"
-            problems.add(message, reader.locations["solver", key], f"remove {key}, or the scheme")
+            problems.add(message, reader.locations["solver", key], f"remove {key}, or remove scheme:")
 
 
 def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
@@ -264,7 +264,7 @@ def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str
     for node in filter(None, nodes):
         parameter = declared.parameters.get(node.text)
         if parameter is None:
-            hint = did_you_mean(node.text, declared.parameters) or "inputs: lists names of parameters"
+            hint = did_you_mean(node.text, declared.parameters) or "write names of parameters"
             declared.reader.error(node, f"inputs: {node.text!r} is not a parameter", hint)
         elif parameter.at != "all":
             declared.reader.error(node, f"inputs: {node.text!r} has a value at each of the {parameter.at}, not one")
@@ -323,7 +323,7 @@ def _gauge(
         if moving:
             place = declared.reader.locations["gauge", name]
             message = f"gauge: the multiple of {name} must not depend on coordinates, and {moving[0]} is one"
-            declared.reader.problems.add(message, place, "numbers and parameters are fine")
+            declared.reader.problems.add(message, place, "use only numbers and parameters")
     return values
 
 
@@ -339,7 +339,7 @@ def _monitor(node: Scalar | None, declared: Declarations) -> str | Expression | 
 def _license(expression: str, declared: Declarations) -> str:
     for part in expression.replace(" AND ", " OR ").split(" OR "):
         if part not in LICENSES and not LICENSE_REFERENCE.fullmatch(part):
-            hint = did_you_mean(part, LICENSES) or "any other licence is written LicenseRef-NAME"
+            hint = did_you_mean(part, LICENSES) or "write any other licence as LicenseRef-NAME"
             message = f"license: {shown(part)} is not an SPDX identifier that phigen knows"
             declared.reader.problems.add(message, declared.reader.locations["license",], hint)
     return expression

@@ -64,9 +64,11 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
         return reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")
     kind, seed, scale, mean = (_option(entries, key, declared) for key in RANDOM_KEYS)
     if kind == "sphere" and not whole:
-        reader.error(entries["random"][1], "random: sphere is for all fields of a site together", _WHOLE_SPHERE)
+        reader.error(
+            entries["random"][1], "random: sphere is only for all coordinates of a site together", _WHOLE_SPHERE
+        )
     if mean is not None and kind == "sphere":
-        reader.error(mean, "mean: random: sphere has the mean 0")
+        reader.error(mean, "mean: values of random: sphere always have the mean 0")
         mean = None
     factor = Fraction(1) if scale is None else declared.number(scale, declared.numbers())
     around = declared.formula(mean, declared.site_numbers())

@@ -216,7 +216,7 @@ class _Builder:
         line = self.text.split("\n")[location.line - 1]
         if needs_quotes(line, location.column - 1):
             self.problems.forget(location.line)  # earlier errors of this line follow from the missing quotes
-            what = "inside { } and [ ], what contains [ ] stands between quotes"
+            what = "inside { } and [ ], write what contains [ ] between quotes"
             hint = f"write {quoted(line).strip()}"
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
 
@@ -226,7 +226,7 @@ class _Builder:
         if kind == "DocumentStartEvent":
             self.start_document(event)
         elif kind == "AliasEvent":
-            hint = "aliases are refused; an expression that starts with * needs quotes"
+            hint = "phigen allows no aliases; write an expression that starts with * between quotes"
             raise self.problems.stop(
                 f"the alias *{event.anchor[:60]} is not allowed", self.place(event.start_mark), hint
             )
@@ -239,17 +239,19 @@ class _Builder:
         place = self.place(event.start_mark)
         self.documents += 1
         if self.documents > 1:
-            raise self.problems.stop("a second YAML document starts here", place, "one spec per file: remove the ---")
+            raise self.problems.stop(
+                "a second YAML document starts here", place, "write one spec per file, and remove the ---"
+            )
         if event.tags or (event.version and tuple(event.version) != (1, 2)):
             raise self.problems.stop("YAML directives are not allowed; a spec is YAML 1.2", place, "remove the % lines")
 
     def start_node(self, kind: str, event: Any) -> None:
         place = self.place(event.start_mark)
         if event.anchor is not None:
-            hint = "anchors are refused; an expression that starts with & needs quotes"
+            hint = "phigen allows no anchors; write an expression that starts with & between quotes"
             raise self.problems.stop(f"the anchor &{event.anchor[:60]} is not allowed", place, hint)
         if event.tag is not None:
-            hint = "tags are refused; a text that starts with ! needs quotes"
+            hint = "phigen allows no tags; write a text that starts with ! between quotes"
             raise self.problems.stop(f"the YAML tag {shown(event.tag)} is not allowed", place, hint)
         self.count += 1
         if self.count > limits.YAML_NODES:

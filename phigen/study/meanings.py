@@ -51,16 +51,16 @@ MEANINGS = (
     ),
     Meaning(
         "Casimir: last/first window",
-        "the largest error in the last tenth of the run, divided by that in the first tenth. Left out if errors "
-        "are rounding, or if some coordinate does not turn back and forth within the first tenth",
+        "the largest error in the last tenth of the run, divided by that in the first tenth. The ratio is left "
+        "out if errors are rounding, or if some coordinate does not go back and forth within the first tenth",
     ),
     Meaning(
         "Casimir: spread over the sites",
-        "the standard deviation over the sites of the change of a Casimir, from the first frame to the last",
+        "the standard deviation, over the sites, of the change of a Casimir between the first and the last frame",
     ),
     Meaning(
         "Casimir: largest change",
-        "the largest change of a Casimir of a lattice on which a vector force acts. This is not an error",
+        "the largest change of a Casimir, for lattices on which a vector force acts. This is not an error",
     ),
     Meaning(
         "invariant: largest error",
@@ -77,19 +77,20 @@ MEANINGS = (
     Meaning(
         "energy: last/first window",
         "the largest energy error in the last tenth of the run, divided by that in the first tenth: about 1 if the "
-        "error oscillates, 10 if it drifts. Judged if the coordinates keep the ranges of the first half of the run",
+        "error oscillates, 10 if it drifts. It is judged if the coordinates keep the ranges of the first "
+        "half of the run",
         _DRIFT,
     ),
     Meaning(
         "energy: last quarter/before",
-        "the largest energy error in the last quarter of a lattice run, divided by that before: about 1 without "
-        "drift. Left out if errors are rounding",
+        "the largest energy error in the last quarter of a lattice run, divided by the largest before: about 1 without "
+        "drift. The ratio is left out if errors are rounding",
         _DRIFT,
     ),
     Meaning(
         "energy balance: last quarter/before",
         "for H minus the work done, if H of a lattice depends on the time or forces act: the largest error in the "
-        "last quarter of the run, divided by that before",
+        "last quarter of the run, divided by the largest before",
     ),
     Meaning(
         "Poisson identity",
@@ -131,12 +132,12 @@ MEANINGS = (
     ),
     Meaning(
         "gradients of members",
-        "the difference between gradients of an ensemble and gradients of its members one by one",
+        "the difference between the gradients of an ensemble and the gradients of each member alone",
         "gradients of ensembles are wrong",
     ),
     Meaning(
         "reversibility",
-        "the distance from the start after a step of h and one of −h. Judged for symmetric methods",
+        "the distance from the start after a step of h and a step of −h. It is judged for symmetric methods",
         "the method is not symmetric, or the equation of a step was not solved to rounding",
     ),
     Meaning(
@@ -152,8 +153,8 @@ MEANINGS = (
     ),
     Meaning(
         "largest step",
-        "the largest step for which the equation of a step has a solution, as a multiple of the step of the run; "
-        "at most 256",
+        "the largest step for which the equation of a step has a solution, as a multiple of the step of the run. "
+        "Larger steps than 256 times that of the run are not tried",
         "the step of the run itself fails: use a smaller one",
     ),
     Meaning(

@@ -229,7 +229,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
     if name not in known:
         raise ValueError(f"over: {name!r} is not a parameter or a coordinate; there are {', '.join(known)}")
     if name == "start" and name not in known[: -len(SWEEP_NAMES)] and not spec.time:
-        raise ValueError("over: start: this system has no time")
+        raise ValueError("over: start: this system does not depend on the time")
     numbers_draws = name == "seed" and name not in known[: -len(SWEEP_NAMES)]
     if isinstance(value, Mapping):
         return _draws(value) if numbers_draws else _range(name, value)
@@ -242,7 +242,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 def _draws(value: Mapping[str, Any]) -> Axis:
     """Return the axis ``seed`` for a mapping {count: n}. Random values are drawn anew for each of its n values."""
     if set(value) != {"count"}:
-        raise ValueError(f"over: seed has a count, and no other key, not {dict(value)!r}")
+        raise ValueError(f"over: seed must have the key count, and no other key, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
 
 

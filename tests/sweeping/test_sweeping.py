@@ -347,7 +347,7 @@ def test_a_step_that_does_not_divide_a_duration_is_refused(spec):
 
 
 def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
-    with pytest.raises(ValueError, match="over: start: this system has no time"):
+    with pytest.raises(ValueError, match="over: start: this system does not depend on the time"):
         phigen.sweep(spec, over={"start": [0, 1]})
     (tmp_path / "members.csv").write_text("x1, start\n0.1, 3\n")
     (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
