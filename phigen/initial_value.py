@@ -66,7 +66,7 @@ class OdeResult:
 
 #: Arguments of SciPy's solve_ivp that are refused → the reason, for the error message.
 _SCIPY = {
-    "method": "the method is that of the solver; order= changes its order",
+    "method": "the solver determines the method; order= changes its order",
     "jac": "phigen derives all derivatives itself",
 }
 _SCIPY |= {"args": "parameters are keyword arguments", "vectorized": "solve_ivp calls no Python function"}

@@ -128,9 +128,7 @@ class DistributedLattice:
         """
         for name in _WHOLE_ONLY:
             if name in more and name not in self.solver.interface.parameters:
-                hint = (
-                    "integrate in one process; or integrate a number of whole steps, and continue from the last state"
-                )
+                hint = "integrate in one process, or make a number of whole steps and continue from the last state"
                 raise TypeError(
                     f"{name} is not available on several processes, which store rows after whole steps only: {hint}"
                 )

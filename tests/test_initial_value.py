@@ -81,5 +81,5 @@ def test_status_says_that_the_end_was_not_reached():
         phigen.solve_ivp(solver_of("pendulum"), (0, 1), [1, 0], t_eval=[0.5, 0.2])
     with pytest.raises(ValueError, match="two different numbers"):
         phigen.solve_ivp(solver_of("pendulum"), (1, 1), [1, 0])
-    with pytest.raises(TypeError, match="no 'method' here: the method is that of the solver"):
+    with pytest.raises(TypeError, match="no 'method' here: the solver determines the method"):
         phigen.solve_ivp(solver_of("pendulum"), (0, 1), [1, 0], method="RK45")

@@ -115,7 +115,7 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
             f"such that the other coordinates form an ideal; {algebra.name} has {count_text}",
-            "reconstruct: matrix works for every algebra with known matrices, with scheme: series or splitting",
+            "use reconstruct: matrix with scheme: series or splitting, for every algebra with known matrices",
         )
     rotation, sign = triples[0]
     return Group(sign > 0, rotation, _vectors(algebra, rotation, sign), algebra.dimension)

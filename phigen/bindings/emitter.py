@@ -72,7 +72,7 @@ def binding(compilation: Compilation, language: str) -> dict[str, str]:
     spec, name = compilation.spec, compilation.spec.name
     if spec.lattice:
         message = f"{name} is a lattice, for which there are no bindings yet"
-        hint = "call the functions that the C header declares; phigen show --expand SIZES writes an ordinary spec"
+        hint = "call the functions that the C header declares, or write an ordinary spec by phigen show --expand SIZES"
         raise SpecError([spec.diagnostic(("lattice",), message, hint)])
     target = LANGUAGES[language]
     values = _values(compilation, target)

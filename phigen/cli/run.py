@@ -68,7 +68,9 @@ _TABLES = (".csv", ".npz")
 )
 @click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
-@click.option("--extend", is_flag=True, help="Continue the finished run in the file of --output beyond its end.")
+@click.option(
+    "--extend", is_flag=True, help="Continue a finished run beyond its end; the run is in the file that --output names."
+)
 @settings_option
 @click.option(
     "-o",
@@ -88,7 +90,7 @@ _TABLES = (".csv", ".npz")
 @click.option(
     "--lyapunov",
     is_flag=True,
-    help="Compute Lyapunov exponents from the exact derivative of each step; for a lattice the largest.",
+    help="Compute Lyapunov exponents from the exact derivative of each step; for a lattice only the largest exponent.",
 )
 @click.option("--resume", is_flag=True, help="Continue an interrupted run that was writing the same files.")
 @force_option

@@ -62,7 +62,7 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
         with collector.collecting():
             spec = load_one(file)
             if spec.name in specs:
-                hint = "names are prefixes of the generated code, and must differ"
+                hint = "give each spec another name, since names of the generated code begin with it"
                 message = f"the name {spec.name!r} is taken by {specs[spec.name].file}"
                 raise SpecError([spec.diagnostic(("name",), message, hint)])
             specs[spec.name] = spec

@@ -115,7 +115,8 @@ def command(
     )
     if options.words and not spec_files:
         raise click.UsageError(
-            "options that change the generated files need a SPEC; without SPEC, the manifest has the options"
+            "options that change the generated files need a SPEC; without SPEC, phigen takes the options "
+            "from the manifest"
         )
     (entries, systems), collector = manifest.read(folder), Collector()
     asked = {"cmake": cmake, "meson": meson, "python": python}
@@ -274,7 +275,7 @@ def _changes_sentence(folder: Path, vendored: VendoredSolver, changes: Sequence[
     sentences += [f"removed {', '.join(removed)}"] if removed else []
     sentences = sentences or [f"{vendored.order.spec.name} unchanged"]
     if not vendored.order.found:
-        sentences.append("from the manifest's copy of the spec, whose file was not found")
+        sentences.append("from the copy of the spec in the manifest, since the file of the spec was not found")
     return (
         f"{folder}: {'; '.join(sentences)} (order {vendored.compilation.program.order}, {vendored.compilation.label})"
     )

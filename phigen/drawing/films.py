@@ -60,7 +60,7 @@ def expect_writer(path: Path) -> None:
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
-        raise MissingPackageError(f"{path.name} needs ffmpeg, which was not found; a .gif film does not")
+        raise MissingPackageError(f"{path.name} needs ffmpeg, which was not found; a .gif film needs no ffmpeg")
 
 
 def _commented(gif: bytes, comment: bytes) -> bytes:

@@ -53,7 +53,7 @@ def first_run(spec: Spec) -> Run:
     spec without such a run.
     """
     if spec.lattice:
-        hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, which can become an FMU"
+        hint = "make the FMU of an ordinary spec, which phigen show --expand SIZES prints for a small lattice"
         raise SpecError(
             [spec.diagnostic(("lattice",), f"{spec.name} is a lattice, for which there are no FMUs yet", hint)]
         )
@@ -65,7 +65,7 @@ def first_run(spec: Spec) -> Run:
             return run
     name, run = next(iter(spec.runs.items()))
     message = f"an FMU of {spec.name} needs a run that goes forward in time, and the step of {name} is {run.step}"
-    hint = "communication steps of FMUs go forward: add a run with a positive step"
+    hint = "add a run with a positive step; an FMU goes forward in time only"
     raise SpecError([spec.diagnostic(("runs", name, "step"), message, hint)])
 
 

@@ -36,7 +36,7 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
     if sign == NOT_NEGATIVE:
         return Statement(name, PROVED, "by its form, except where it is 0")
     if starts:
-        return Statement(name, CHECKED, f"where runs start, {len(starts)}; a step fails where it is not positive")
+        return Statement(name, CHECKED, f"at the starts of runs, {len(starts)}; a step fails where it is not positive")
     return Statement(name, UNDECIDED, "the spec has no runs; a step fails where it is not positive")
 
 
@@ -59,7 +59,7 @@ def not_negative(
             return Statement(name, REFUTED, "no value where a run starts", shortened(e))
         if value < 0:
             return Statement(name, REFUTED, f"{value:.6g} where a run starts", shortened(e))
-    return Statement(name, CHECKED, f"where runs start, {len(points)}") if points else None
+    return Statement(name, CHECKED, f"at the starts of runs, {len(points)}") if points else None
 
 
 def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:

@@ -57,7 +57,7 @@ def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:
         with suppress(ValueError):  # raised if the prime divides a denominator
             ranks.append(int(nmod_mat(len(rows), len(rows[0]), _residues(rows, prime), prime).rank()))
     if not ranks:
-        raise DomainError("denominators that the primes divide")
+        raise DomainError("the rank is not known, since all primes in use divide denominators")
     return max(ranks)
 
 

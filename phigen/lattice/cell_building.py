@@ -182,8 +182,8 @@ def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():
         if is_declared and cell.bond_bracket:
-            message = f"{path[-1]}: not offered together with brackets along bonds"
-            yield spec.diagnostic(path, message, "forces: {vector: …} can be combined with brackets along bonds")
+            message = f"{path[-1]}: not offered together with poisson: bonds"
+            yield spec.diagnostic(path, message, "use forces: {vector: …}, which can be combined with poisson: bonds")
 
 
 def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:

@@ -61,9 +61,7 @@ class GraphSearch(PartSearch):
         self._along_bonds = {(f.partition("[")[0], g.partition("[")[0]) for f, g in self.cell.bond_bracket}
         bonds = [s for s in summands_of(self.cell) if s.bond]
         if bonds and self._along_bonds:
-            raise NoPartError(
-                bonds[0].expression, "energies of bonds are not offered together with brackets along bonds"
-            )
+            raise NoPartError(bonds[0].expression, "hamiltonian: bonds is not offered together with poisson: bonds")
 
     # --- commuting terms
 

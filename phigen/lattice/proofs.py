@@ -273,7 +273,11 @@ def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], doma
         count *= size
     if count > _MAX_BOX_COORDINATES:
         prefix = f"{domain_text}, " if domain_text else ""
-        return Statement(name, UNDECIDED, f"{prefix}proved away from open ends; a box with ends is too large")
+        return Statement(
+            name,
+            UNDECIDED,
+            f"{prefix}proved away from open ends; the smallest lattice with open ends is too large to examine",
+        )
     least = 1 + max(*cell.hamiltonian_reach, *cell.poisson_reach)
     boxes = [(n,) for n in range(least, sizes[0] + 1)] if len(sizes) == 1 else [sizes]
     for box in boxes:

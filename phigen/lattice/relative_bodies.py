@@ -193,7 +193,7 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
         "forces": (bool(cell.forces.covector or cell.forces.vector), "only the attraction of bodies is integrated"),
         "damping": (cell.forces.damping is not None, "only the attraction of bodies is integrated"),
         "noise": (bool(cell.noise), "only the attraction of bodies is integrated"),
-        "adjoint": (spec.extras.adjoint, "gradients of bodies are offered for ordinary specs only"),
+        "adjoint": (spec.extras.adjoint, "gradients with these coordinates are offered only for ordinary specs"),
     }
     for key, (present, reason) in refused.items():
         if present:

@@ -61,7 +61,7 @@ class MatrixFunction(Arithmetic[Matrix]):
         """Raise `SpecError`, since elementary functions of a matrix are not rational."""
         raise refuse(
             f"birealisation group-map: tau uses {name} of a matrix; it must be a rational function of P",
-            "kind: exponential is τ = exp(P); other functions are given entry by entry",
+            "use kind: exponential for τ = exp(P), or write tau as a matrix of entries",
         )
 
     def _power(self, base: Matrix, n: int) -> Matrix:

@@ -52,7 +52,8 @@ def assembled(
         if realisation.path:
             names = ", ".join(part.coordinates)
             raise refuse(
-                f"birealisation {KIND}: no closed form is known for the block ({names})", "karasev follows paths"
+                f"birealisation {KIND}: no closed form is known for the block ({names})",
+                "use birealisation: karasev, which needs no closed form",
             )
 
     def joined(name: str) -> tuple[Expression, ...]:

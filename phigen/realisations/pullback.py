@@ -41,7 +41,10 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
     structure = part(system, form.coordinates, form.of)
     inner = build_inner(structure, choice)
     if inner.path or not inner.exact:
-        raise refuse(f"birealisation {KIND}: no closed form is known in the coordinates of the map", "try karasev")
+        raise refuse(
+            f"birealisation {KIND}: no closed form is known in the coordinates of the map",
+            "use birealisation: karasev, which needs no closed form",
+        )
     alpha, beta = (moved(system, form, change, maps) for maps in (inner.alpha, inner.beta))
     x = [symbol(c) for c in system.coordinates]
     return BiRealisation(

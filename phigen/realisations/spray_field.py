@@ -65,7 +65,10 @@ def _covector_part(system: System, name_or_forces: str | Sequence[Expression]) -
         return "natural", _natural(system)
     if name_or_forces in ("auto", "flat"):
         return "flat", [ZERO] * system.dimension
-    raise refuse(f"unknown spray {name_or_forces!r}", "auto, flat, natural or one expression for each coordinate")
+    raise refuse(
+        f"unknown spray {name_or_forces!r}",
+        "write auto, flat or natural, or a list with one expression for each coordinate",
+    )
 
 
 def _natural(system: System) -> list[Expression]:
@@ -107,7 +110,7 @@ def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]
         if degrees - {2} or any(component.degrees()[k] for k in non_polynomial):
             raise refuse(
                 f"spray: the component of p_{c}, {shortened(e)}, is not homogeneous of degree 2 in the covector",
-                "a spray has components Σ f_kl(x) p_k p_l",
+                "write each component of a spray as Σ f_kl(x) p_k p_l",
             )
 
 
@@ -121,7 +124,7 @@ def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS)
         result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
         if len(result[-1]) > most_terms:
             raise LimitError(
-                [Diagnostic(f"the Lie series of the spray has more than {most_terms} terms", hint="lower the degree")]
+                [Diagnostic(f"the Lie series of the spray has more than {most_terms} terms", hint="use a lower degree")]
             )
     return result
 

@@ -354,7 +354,7 @@ class CLatticeSession:
     @staticmethod
     def _expect_done(status: int) -> None:
         if status:
-            raise ValueError(f"no such stage, planes or step: {status_name(status)}")
+            raise ValueError(f"there is no such stage, plane or step: {status_name(status)}")
 
     def _filled(self, function: Any, shape: tuple[int, ...]) -> Floats:
         result = np.empty(shape, self._real)

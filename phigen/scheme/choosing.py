@@ -197,7 +197,10 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
     small_flow, large_flow = choice.splitting.flows
     modified = modified_kick(system, small_flow, large_flow)
     if modified is None:
-        message = f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} in coordinates that commute"
+        message = (
+            f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} to depend only on coordinates "
+            "that commute"
+        )
         hint = "use coordinates_from: jacobi, where B is of this kind, or composition: wisdom-holman-17, for every B"
         raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
     return replace(choice, splitting=SplitHamiltonian((modified, large_flow), kick=0, small=0))

@@ -24,7 +24,8 @@ from phigen.symbolic.expression import Expression
 
 #: Hint if H depends on the time, so that e is not constant: the user can make t and e coordinates of the system.
 EXTENDED_SYSTEM_HINT = (
-    "without time: make t and e coordinates too, a canonical pair; hamiltonian: g*(H + e), with e = -H at the start"
+    "remove time:, and make t and e coordinates too, a canonical pair; then hamiltonian: g*(H + e), "
+    "with e = -H at the start"
 )
 
 

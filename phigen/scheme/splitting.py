@@ -230,11 +230,11 @@ def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
     Most of them need the state after each single step, which exists only at the end of a run.
     """
     refused = {
-        "time": (bool(system.time), "the flows of a corrector would need times of their own"),
+        "time": (bool(system.time), "the flows of the corrector would need other times than the steps"),
         "noise": (bool(system.noise), "the inverse of a corrector cannot reverse noise"),
         "forces": (system.forces is not None, "the inverse of a corrector would reverse dissipation"),
         "monitor": (spec.monitor is not None, "a corrector requires steps that are equal in the physical time"),
-        "reconstruct": (bool(spec.reconstruct), "attitudes are those of single steps"),
+        "reconstruct": (bool(spec.reconstruct), "attitudes are defined only between single steps"),
     }
     for key, (is_present, reason) in refused.items():
         if is_present:

@@ -88,7 +88,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
     momenta = [[conjugate(ring, c) for c in axis] for axis in axes]
     if missing := [c for axis in axes for c in axis if conjugate(ring, c) is None]:
         reason = f"{ring.coordinates[missing[0]]} has no momentum p with {{q, p}} = 1; a velocity is not a momentum"
-        raise _NoBodiesError(f"{reason}; poisson: {{canonical: {{q: […], p: […]}}}} has them")
+        raise _NoBodiesError(f"{reason}; declare momenta as poisson: {{canonical: {{q: […], p: […]}}}}")
     coefficients = ring.terms(ring.tower.combine(t.element for t in terms), ring.state)
     used_monomials: set[Monomial] = set()
     strengths: dict[tuple[int, int], Expression] = {}

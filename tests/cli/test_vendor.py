@@ -188,7 +188,7 @@ def test_without_its_spec_a_solver_is_checked_against_the_copy_with_a_message(ph
     assert "unmodified and current" not in result.stderr
     damage_body()
     assert vendored().exit_code == 5
-    assert "from the manifest's copy" in phigen("vendor", EXT, "--force").stderr
+    assert "from the copy of the spec in the manifest" in phigen("vendor", EXT, "--force").stderr
     assert vendored().exit_code == 0
     assert solvers()["a"]["spec"]["file"] == "../../models/a.yaml"
 

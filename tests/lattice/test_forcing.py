@@ -391,7 +391,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
          'hamiltonian: "-x*x[i+1] - x*x[i+2] - z*z[i+3] - y*y[i+4]"', "damped at the same time"),
         (TEXTS["free"].replace("hamiltonian: x,", "hamiltonian: x*y + z**3,"), "needs the flow of the noise x"),
         ("damping: 0.1\nlattice: {graph: b}\ncoordinates: [x]\npoisson: {bonds: {'x[a]': {'x[b]': 1}}}\n"
-         "hamiltonian: {sites: x**2}", "damping: not offered together with brackets along bonds"),
+         "hamiltonian: {sites: x**2}", "damping: not offered together with poisson: bonds"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_combined_is_refused_where_it_stands(text: str, said: str) -> None:

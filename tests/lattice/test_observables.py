@@ -260,7 +260,7 @@ def test_observables_go_to_files_sessions_and_xarray(tmp_path):
         (WEB, "{max: p**2}", "{max: p**2, over: bonds}", "'p' does not say at which end of a bond"),
         (WEB, "{sum: p}", "{sum: p, over: pairs}", "over: pairs needs lattice: {pairs: all}"),
         (WEB, "{sum: p}", '{sum: "p[a]"}', "p[…]"),
-        (WEB, '{sum: "q[a]*p[b]**2", over: bonds}', "{sum: q*p, over: bonds}", "'q' does not say at which end of a bond"),
+        (WEB, '{sum: "q[a]*p[b]**2", over: bonds}', "{sum: q*p, over: bonds}", "'q' does not say at which end"),
         (FILM, "sizes: [4, 5]", "sizes: [2, 5]", "sizes: 2 along i is too small"),
     ],
 )
@@ -274,7 +274,7 @@ def test_mistakes_are_told_with_their_place(text, old, new, message):
 
 def test_densities_are_those_of_lattices():
     text = "phigen: 1\nname: o\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2 + q**2\n"
-    with pytest.raises(phigen.SpecError, match="observables: mean is over the sites of a lattice"):
+    with pytest.raises(phigen.SpecError, match="observables: the key mean is only for specs with lattice:"):
         phigen.spec.loads(text + "observables: {M: {mean: q}}\n")
 
 

@@ -267,7 +267,7 @@ def test_the_hint_for_a_monitor_with_a_time_is_a_spec_that_is_right():
         "invariants", "#"
     )
     with pytest.raises(
-        SpecError, match="make t and e coordinates too, a canonical pair; hamiltonian: g\\*\\(H \\+ e\\)"
+        SpecError, match="make t and e coordinates too, a canonical pair; then hamiltonian: g\\*\\(H \\+ e\\)"
     ):
         compile_spec(spec.loads(driven + "time: t\n"))
     solver = solver_of(compiled_text(BY_HAND.replace("+ e)", "+ q1*sin(t)/9 + e)")), "c")
