@@ -40,7 +40,7 @@ def expect_replaceable(path: Path, option: str | None = None) -> None:
         return
     meta = click.get_current_context().meta
     if not meta.get(_FORCE) and not _is_of_phigen(path):
-        message = f"{str(path)!r} exists, and perhaps phigen did not write it; --force replaces it"
+        message = f"{str(path)!r} exists, and nothing shows that phigen wrote it; --force replaces it"
         raise click.BadParameter(message, param_hint=option)
     meta.setdefault(_REPLACED, set()).add(path)
 

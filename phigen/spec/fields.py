@@ -118,7 +118,7 @@ LIE_ALGEBRA = Record(
         RecordKey(
             "structure_constants",
             MapOf(BASIS, MapOf(BASIS, MapOf(BASIS, FORMULA))),
-            "the commutators: {E1: {E2: {E3: c}}} means [E_1, E_2] = c E_3; commutators that are not given are 0",
+            "the commutators: {E1: {E2: {E3: c}}} means [E_1, E_2] = c E_3; those of missing pairs are 0",
         ),
         RecordKey(
             "sign",
@@ -135,7 +135,7 @@ _FORMS: dict[str, tuple[Kind, str]] = {
     "matrix": (MATRIX, "the Poisson tensor π, as the n×n matrix of the brackets {x_i, x_j}"),
     "brackets": (
         MapOf(NAME, MapOf(NEIGHBOUR, FORMULA)),
-        'the brackets: {x1: {x2: f}} means {x1, x2} = f; those not given are 0; on lattices also {x: {"y[i-1]": f}}',
+        'brackets: {x1: {x2: f}} means {x1, x2} = f; those of missing pairs are 0; on lattices also {x: {"y[i-1]": f}}',
     ),
     "canonical": (CANONICAL, "positions q and momenta p with {q_i, p_i} = 1"),
     "log_canonical": (MATRIX, "the n×n matrix of the coefficients a_ij in {x_i, x_j} = a_ij x_i x_j"),
@@ -225,8 +225,7 @@ BIREALISATION = Record(
         RecordKey(
             "side",
             OneOf(("q", "p")),
-            "for canonical-euler: H is evaluated at these coordinates of the start, and at the others of the "
-            "end, of a step",
+            "for canonical-euler: a step takes H at q of its start and p of its end (q), or the reverse (p)",
             default="q",
         ),
         RecordKey(
@@ -349,7 +348,12 @@ OBSERVABLE = Record(
         RecordKey("sum", FORMULA, "the sum of this formula over all sites, bonds or pairs"),
         RecordKey("max", FORMULA, "the largest value of this formula at a site"),
         RecordKey("min", FORMULA, "the least value of this formula at a site"),
-        RecordKey("over", OneOf(OVER), "what the mean or the sum is over: sites, bonds or pairs", default="sites"),
+        RecordKey(
+            "over",
+            OneOf(OVER),
+            "the set over which the mean or the sum is taken: sites, bonds or pairs",
+            default="sites",
+        ),
     ),
     one=REDUCTIONS,
     exactly=True,
@@ -400,7 +404,7 @@ AVERAGE = Record(
             Integer(2, 10_000),
             "the number of blocks of rows from which standard errors are estimated; 20 if not given",
         ),
-        RecordKey("of", ListOf(NAME, least=1), "the observables that are averaged; all if not given"),
+        RecordKey("of", ListOf(NAME, least=1), "the observables whose averages are shown; all if not given"),
     ),
     example="{after: 200, blocks: 20}",
 )
@@ -410,7 +414,7 @@ SPECTRUM = Record(
         RecordKey(
             "of",
             ListOf(NAME, least=1),
-            "the coordinates whose spectrum S(q, ω), the sum of their |f(q, ω)|², is computed",
+            "the coordinates f in S(q, ω) = Σ |f(q, ω)|², which is averaged over frames",
             required=True,
         ),
         RecordKey("after", CONSTANT, "the time from which states are used; earlier states are left out"),
@@ -623,7 +627,7 @@ SPEC = Record(
         RecordKey(
             "inputs",
             ListOf(NAME, least=1),
-            "the parameters that change while a program runs, which are the inputs of an FMU",
+            "the parameters that change while a program runs; they are the inputs of an FMU",
         ),
         RecordKey("time", TIME, "the name of the time, for systems that depend on the time"),
         RecordKey("definitions", FORMULAS, "expressions with names, which every other expression can use"),
@@ -651,9 +655,9 @@ SPEC = Record(
         RecordKey(
             "casimirs",
             MapOf(NAME, Either({Scalar: FORMULA, Mapping: CASIMIR})),
-            "the Casimirs, by name; phigen check proves or refutes them",
+            "the Casimirs, by name; phigen check examines them",
         ),
-        RecordKey("invariants", FORMULAS, "further first integrals, by name; phigen check proves or refutes them"),
+        RecordKey("invariants", FORMULAS, "first integrals other than Casimirs, by name; phigen check examines them"),
         RecordKey(
             "observables",
             MapOf(NAME, Either({Scalar: FORMULA, Mapping: OBSERVABLE})),
@@ -663,7 +667,7 @@ SPEC = Record(
         RecordKey(
             "birealisation",
             Either({Scalar: KIND, Mapping: BIREALISATION}),
-            "the maps (y, p) ↦ x, x' by which a series makes a Poisson map; auto chooses by the form of π",
+            "the maps (y, p) ↦ x, x' by which scheme: series makes a Poisson map; auto chooses by the form of π",
             default="auto",
         ),
         RecordKey("order", Integer(1, limits.ORDER, limit=True), "the order of the method", default=DEFAULT_ORDER),
