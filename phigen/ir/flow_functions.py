@@ -27,8 +27,9 @@ _LANES = ir.Pointer(constant=False, lanes=True)
 class FlowFunctions:
     """The functions of the flows of a splitting, for a single trajectory.
 
-    A flow updates ``along`` values: the ``dimension`` coordinates, and two more if there is a monitor. With ``turns``,
-    it also updates the attitude, a group element. With ``stores``, the state is stored on a tape before each flow.
+    A flow updates ``along`` values. The first ``dimension`` values are the coordinates. With a monitor, two further
+    values follow: the physical time of the step, and a sum that is NaN if the step is not defined. With ``turns``, a
+    flow also updates the attitude, a group element. With ``stores``, the state is stored on a tape before each flow.
     """
 
     dimension: int
@@ -84,8 +85,8 @@ class FlowFunctions:
         yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
 
     def corrector(self, schedule: Schedule) -> ir.Function:
-        """Return the function of the corrector. It applies flows of two parts alternately, before the first step of a
-        run and after the last step.
+        """Return the function of the corrector, which alternates between the flows of two parts. It is called before
+        the first step of a run and, with other durations of the flows, after the last step.
         """
         (outer, first), *others = schedule.begin
         (_, last), *_ = schedule.end

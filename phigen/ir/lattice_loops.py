@@ -74,8 +74,8 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, body, gather if gather.names else None)
 
     def sums(self, ends: Ends) -> ir.Function:
-        """Return the function that computes sums at each site, over the bonds that begin or end there, or over all
-        other sites.
+        """Return the function that computes sums at each site. The sums are over bonds of the site or, for pairs, over
+        all other sites.
         """
         kernel = ends.kernel
         source = "params" if "params" in kernel.inputs else "coef"
@@ -90,8 +90,8 @@ class LatticeLoops:
     def transposed(
         self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the function of a transposed kernel: of a kernel of a ``sweep`` or, without ``sweep``, of a kernel of
-        a stage.
+        """Return the function of a transposed kernel. The original kernel belongs to a ``sweep`` or, without ``sweep``,
+        to a stage.
 
         ``gather`` has the sums that the kernel reads. The kernel recomputes, by the inverse flow, the values that
         ``fields`` had before the sweep.
@@ -220,8 +220,8 @@ class LatticeLoops:
 
     @cached_property
     def derived(self) -> dict[str, str]:
-        """The arrays of derived values, which solvers compute for each site: the name of each array, and the member
-        that stores it.
+        """The derived values, which solvers compute for each site from parameters: a map from the symbol of a value to
+        the name of its array.
         """
         return {symbol: symbol.kind for symbol in self.step.sites.derived}
 

@@ -41,8 +41,8 @@ class SumLaunch:
 
 @dataclass(frozen=True)
 class SiteLaunch:
-    """Data for launching a kernel over the sites of a lattice. Before it, the kernels of the ``sums`` that it reads are
-    launched.
+    """Data for launching a kernel over the sites of a lattice. The kernels ``sums`` are launched first: they compute
+    the sums that this kernel reads.
 
     ``outputs`` is the number of outputs of the kernel per site. ``colour``, ``inside`` and ``window`` select sites as
     in `phigen.ir.nodes.Selection`.

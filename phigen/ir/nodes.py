@@ -2,8 +2,9 @@
 arithmetic is an `Expression` in symbols that statements declare.
 
 There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops run
-over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays. Each
-target has one lowering pass from the level of sites to the level of memory, the only level that printers accept.
+over sites, bonds or pairs. On the level of *memory*, `Entry` and `Member` name elements of arrays and members of
+records, and loops count an index. Each target has one lowering pass from the level of sites to the level of memory, the
+only level that printers accept.
 
 A dialect of C, such as that of a device, applies the lowering by rows (`phigen.ir.passes.by_rows`) or by tables
 (`phigen.ir.passes.by_tables`), and prints the result by a `phigen.targets.spelling.Dialect`. The iterations of
@@ -22,8 +23,8 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
 #: Kinds of symbols for variables that are not in the spec. Variables of both kinds are printed with the names that the
-#: builder gives. If the spec uses the same name, the kinds differ: the kind FIXED keeps the name, and the name of the
-#: spec is changed; a variable of the kind LABEL is renamed.
+#: builder gives. If the spec uses such a name too, one of the two variables is renamed: for the kind FIXED the variable
+#: of the spec, for the kind LABEL the variable of the builder.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -32,7 +33,7 @@ class Type(Enum):
 
     REAL = auto()
     INDEX = auto()
-    SIZE = auto()  # number of elements, or number of a row segment
+    SIZE = auto()  # count of elements, or index of a row segment
     FLAG = auto()  # small integer
     ARRAY = auto()  # array of reals, in a language without pointers
     INDICES = auto()  # array of indices, in a language without pointers
@@ -448,8 +449,8 @@ class Loop:
 
     ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
     "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
-    ``threads`` sites. The body of a loop of the kind "line" or "search" is a single statement. In a "search", this
-    statement may return from the function.
+    ``threads`` sites. A loop of the kind "line" is printed on one line. A loop of the kind "search" may return from the
+    function. In both cases the body is a single statement.
     """
 
     kind: str
@@ -569,7 +570,7 @@ PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
 _ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "received", "at_bonds"), Type.ARRAYS)
 _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
-#: Types of the parameters of functions that the lowering by rows makes, by name.
+#: Types of the parameters of functions after the lowering by rows: name of the parameter → type.
 TYPES: dict[str, ParameterType] = {
     "s": RecordType("solver"),
     "row": RecordType("row"),
@@ -586,7 +587,7 @@ TYPES: dict[str, ParameterType] = {
 
 @dataclass(frozen=True)
 class ConstantTable:
-    """Array of integers with a name: constants of a model."""
+    """Array of constant integers, with its name in generated code."""
 
     name: str
     values: tuple[int, ...]
@@ -621,7 +622,7 @@ class Function:
 
     @property
     def known_types(self) -> dict[str, ParameterType]:
-        """The types of the parameters of a function after lowering, by name."""
+        """Map from the names of the parameters of a function to their types, after lowering."""
         return {**TYPES, **dict(self.types)}
 
     def with_body(self, *body: Statement) -> Function:

@@ -113,7 +113,9 @@ class PathFunctions:
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
-        """Return the statements that compute the values of all nodes at one point m, in the array e."""
+        """Return the statements that compute the values of all nodes at one point m. The values are stored in the array
+        e.
+        """
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
@@ -219,7 +221,7 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 class _LaneLayout(PathLayout):
     """The places of the values of a path in one lane of the record e.
 
-    Some series are needed for derivatives of the path only. Their numbers follow those of the series of the path.
+    Some series are needed only for the derivatives of the path. They are numbered after the series of the path itself.
     """
 
     def __init__(self, path: Recurrences) -> None:
@@ -330,8 +332,8 @@ class _LaneFunctions:
         """Return the function that adds terms of order k to derivatives of the path, one term for each of
         ``entries``.
 
-        An entry is a triple: the index of the derivative, a factor, and an entry of ∂(π p)/∂m, π or ∂(π p)/∂c, where c
-        is a coefficient.
+        Each of ``entries`` is a triple: the index of the derivative, a factor, and an element of one of the matrices
+        ∂(π p)/∂m, π and ∂(π p)/∂c, where c is a coefficient.
         """
         statements = [
             ir.Assign(_in_lane(ir.entry(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)

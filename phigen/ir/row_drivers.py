@@ -1,8 +1,8 @@
 """Row drivers: functions of the generated C that call the loops over sites for each row segment of a lattice.
 
-A row segment is a part of a row of sites; threads share the work by segments. The functions are on the level of memory,
-for the lowering by rows (`phigen.ir.passes.by_rows`). On a device that distributes row segments, loops of the kind
-"segments" are mapped to threads.
+A row segment is a part of a row of sites; threads share the work by segments. The functions call loops that are lowered
+by rows (`phigen.ir.passes.by_rows`). On a device that distributes row segments, loops of the kind "segments" are mapped
+to threads.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class RowDrivers:
     def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
         """Yield the statement that determines the part of H to which a flow of the schedule belongs.
 
-        The statement also replaces the variable ``flow`` by the colour that the flow updates.
+        The statement also assigns to the variable ``flow`` the colour that the flow updates.
         """
         arguments = (S, ir.Prefix("&", FLOW))
         if switched:
@@ -170,9 +170,9 @@ class _Driver:
     def over_segments(self, cases: Sequence[RowSegment | ir.Block], labels: Sequence[int]) -> ir.Block:
         """Return the loop over row segments, or a switch over several loops of this kind.
 
-        Each case copies the ends of the rows of the fields that it updates to the halo. There is an exception: if one
-        loop serves all parts of H, and the lattice is a single row with open ends, a statement after the switch copies
-        the ends of all fields. Only the first and the last segment read these copies.
+        Each case ends with a copy of the ends of rows to the halo, for the fields that the case updates. There is an
+        exception: if one loop serves all parts of H, and the lattice is a single row with open ends, a statement after
+        the switch copies the ends of all fields. Only the first and the last segment read these copies.
         """
         drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
         copies = [[*self._copied_ends(case)] for case in segments]
@@ -217,7 +217,7 @@ def at(sites: Sites) -> ir.Value:
 
 
 def divides(calls: ir.Block) -> bool:
-    """Whether calls are for parts of a segment only, such as its sites near open ends or seams."""
+    """Whether some of the ``calls`` are for a part of a segment, such as the sites near open ends or seams."""
     return not {SECOND.symbol, STOP.symbol}.isdisjoint(names_in(calls))
 
 

@@ -10,7 +10,7 @@ the following members of this record:
 - ``present``: for each term near open ends, an array that is 1 at sites where the term exists, else 0
 - ``coloured``: for each colour, the numbers of its sites
 - ``beside``: the numbers of the sites in or near boundary seams
-- ``inside``: the numbers of all other sites, for each colour and together
+- ``inside``: the numbers of all other sites, as a list for each colour and a list for all colours
 - ``colours``: the colour of each site
 - ``sums``: an array for each sum over bonds or pairs, one after another
 - ``dw``: an array for each source of noise, one after another
@@ -42,7 +42,7 @@ _PARAMETERS = {"state": "x", "varied": "v"}
 
 
 def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a function on the level of memory, from a function of a lattice on the level of sites."""
+    """Return a function of a lattice, lowered from the level of sites to the level of memory (`phigen.ir.nodes`)."""
     parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
     if not any(isinstance(s, ir.Store) for s in statements(function.body)):
         return replace(function, parameters=parameters, body=())

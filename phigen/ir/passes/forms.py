@@ -15,13 +15,13 @@ from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS, LANE_FORMULAS, LAN
 from phigen.symbolic.expression import Expression, fold, raw, topological
 from phigen.symbolic.special import SPECIAL
 
-#: Suffixes of the names of functions: polynomials for small arguments; versions for SIMD lanes; and versions for all
-#: arguments that the solver defines in place of library functions.
+#: Suffixes of the names of functions. NEAR: polynomials for small arguments. LANE: versions for SIMD lanes. OWN:
+#: versions for all arguments, which the solver defines in place of library functions.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
 #: Versions of elementary functions: SIMD for loops over lanes, IN_LANES for loops over sites. Functions with a
-#: removable singularity are not in IN_LANES, since loops over sites compute them by polynomials for small arguments
-#: only. FULL_RANGE has the members of IN_LANES that are correct for all arguments.
+#: removable singularity are not in IN_LANES: their versions for lanes are polynomials, which loops over sites call only
+#: for small arguments. FULL_RANGE has the members of IN_LANES that are correct for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}

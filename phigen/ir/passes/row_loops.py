@@ -213,8 +213,8 @@ def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
 
 
 def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
-    """Yield the statements that store values in the arrays of callers. Values of stores that add become summands of
-    these values.
+    """Yield the statements that store values in the arrays of callers. Some stores add: their values are added to each
+    value that is stored.
     """
     shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:
@@ -260,8 +260,8 @@ def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
 def bonds_of(
     loop: ir.Loop, rows: RowDeclarations, updated: Iterable[ir.Statement], sign: ir.Value, *, across: bool = False
 ) -> ir.Loop:
-    """Return the loop over the bonds of a site. ``loop.end`` selects the bonds that begin there ("a"), end there ("b"),
-    or both ("").
+    """Return the loop over the bonds of a site. ``loop.end`` selects the bonds that begin at the site ("a"), the bonds
+    that end at the site ("b"), or all bonds of the site ("").
 
     Bonds are skipped if their end ``loop.chosen`` does not have the colour of the sweep; with ``across``, a flag of the
     caller decides which end is tested. The direction of a bond is 1 or −1, and opposite at its two ends. It is stored

@@ -64,11 +64,12 @@ class Handed:
 class Transpose:
     """A transposed function on the level of sites, and the arrays in which its results are stored.
 
-    The function reads cotangents of the kind ``seed``. They are the cotangents of the fields with the numbers
-    ``fields`` or, if ``fields`` is empty, the variations in the row record. First the function adds the contributions
-    ``received``, which an earlier loop has stored. It stores its own contributions to neighbours in the arrays of
-    ``handed``. ``summed`` is the number of sums over bonds or pairs that the function reads; the cotangents of these
-    sums are stored in the arrays from number ``sums_from`` on. The function also writes the fields ``recomputed``.
+    The function reads cotangents of the kind ``seed``. They are stored in the arrays of cotangents of the fields with
+    the numbers ``fields``. If ``fields`` is empty, they are stored in the arrays ``varied`` of the row record. First
+    the function adds the contributions ``received``, which an earlier loop has stored. It stores its own contributions
+    to neighbours in the arrays of ``handed``. ``summed`` is the number of sums over bonds or pairs that the function
+    reads; the cotangents of these sums are stored in the arrays from number ``sums_from`` on. The function also writes
+    the fields ``recomputed``.
     """
 
     function: ir.Function
