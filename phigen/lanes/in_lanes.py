@@ -46,9 +46,9 @@ PACKS_PER_GROUP = 4
 MEMBER_BATCHES = 4
 
 #: Members of an ensemble are integrated in batches up to this number of stages. The second number applies if kernels
-#: call functions, and if the iteration for a single trajectory has only momenta as unknowns. In a batch this iteration
-#: has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski top 1.13
-#: with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
+#: call functions and, in addition, the iteration for a single trajectory has only momenta as unknowns. In a batch, the
+#: iteration has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski
+#: top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -58,7 +58,7 @@ _DOUBLE = 8
 class LaneKernel:
     """Kernel that is evaluated in all lanes; inputs that are ``shared`` have one value for all lanes.
 
-    A ``single`` kernel is evaluated for one lane only, and its outputs are numbers. A ``sparse`` kernel does not store
+    A ``single`` kernel is evaluated in a single lane, and its outputs are numbers. A ``sparse`` kernel does not store
     outputs that are always zero.
     """
 
@@ -152,8 +152,8 @@ class Stages:
     """The stages of a Gauss method, one in each lane. ``narrow`` says that half the number of lanes is enough for the
     stages.
 
-    ``batched`` are the kernels for batches of members of an ensemble, with one member in each lane. It is () if members
-    are integrated one by one.
+    ``batched`` are the kernels for batches of members of an ensemble, with one member in each lane. ``batched`` is ()
+    if members are integrated one by one.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -199,13 +199,13 @@ def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
     """Return blocks of steps, if several steps can be solved together. Otherwise return the paths for the
     reverse pass.
 
-    In single precision, or if the spec excludes lanes, None takes the place of the paths.
+    In single precision, or if the spec excludes lanes, None is returned instead of the paths.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)
     if blocks or program.single or not program.lanes:
-        return blocks  # the other code of paths in lanes assumes numbers of 64 bits
+        return blocks  # the code for `Traces` assumes numbers of 64 bits
     return _traces(program, step)
 
 
@@ -253,7 +253,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        if not (program.extras.tangent or step.adjoint):  # without derivatives, the code uses differences of sweeps
+        # Kernels of variations serve tangent maps and gradients. Other short code uses difference quotients of sweeps.
+        if not (program.extras.tangent or step.adjoint):
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
@@ -271,7 +272,7 @@ def _called_in_forms(step: Sweeps) -> set[str]:
     """Return the functions that are called by kernels whose loops have two forms: for small arguments, and for all
     arguments.
 
-    Derivatives of a stage along variations, and transposes of sums over bonds or pairs, have one form only.
+    Derivatives of a stage along variations, and transposes of sums over bonds or pairs, have a single form.
     """
     kernels = [sweep.kernel for part in step.parts for sweep in part]
     kernels += [step.equation.relax, step.equation.advance] if step.equation else []

@@ -183,8 +183,8 @@ def _path(
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
     """Return the kernel ``prepare``, which computes the coefficients.
 
-    Coefficients are values that depend on parameters and step size only. The kernel must be built last, when the table
-    of coefficients is full.
+    Coefficients are values that depend only on parameters and the step size. The kernel must be built last, when the
+    table of coefficients is full.
     """
     return Kernel(
         "prepare",

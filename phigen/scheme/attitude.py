@@ -30,8 +30,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Some outputs have the components p_i of a matrix P = Σ p_i E_i with basis matrices E_i, and in the end a bound for
-#: the square of the norm of P. This is the comment on the bound in generated code.
+#: Some outputs have the components p_i of a matrix P = Σ p_i E_i with basis matrices E_i, then a bound for the square
+#: of the norm of P. This is the comment on the bound in generated code.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
@@ -169,7 +169,7 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols for the entries of g − 1, where g is the group element of the step before the next flow."""
+    """Return the symbols for the entries of g − 1, where g is the group element of the step up to the next flow."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 

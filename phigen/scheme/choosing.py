@@ -31,15 +31,15 @@ from phigen.symbolic.expression import gradient, symbols_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: Cost of a flow, in operations, for each coordinate that it updates, in addition to the cost of its formulas. Most of
-#: it is the time for which the flow waits for the results of the flow before. The value was fitted to timings of
-#: fourteen pairs of methods on seven systems: in twelve pairs the faster method is chosen, and in the other two pairs
-#: the chosen method takes at most 1.34 times as long.
+#: this additional cost is the time for which a flow waits for the results of the preceding flow. The value was fitted
+#: to timings of fourteen pairs of methods on seven systems: in twelve pairs the faster method is chosen, and in the
+#: other two pairs the chosen method takes at most 1.34 times as long.
 FLOW_LATENCY = 12
 
 
 @dataclass(frozen=True)
 class ScheduledMethod:
-    """A method, with the parts of H in the order in which its steps apply their flows.
+    """A splitting method, and the parts of H in the order in which a step applies their flows.
 
     If the method has modified kicks, their flow takes the place of the flow of V. ``why`` is the reason of the choice,
     as text for the user. If H depends on the time, ``carrier`` is the number of the part during whose flow the time
@@ -93,8 +93,8 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
 def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
     """Whether methods for near-integrable systems H = A + εB do not apply; ``small`` is the index of εB.
 
-    Forces exclude these methods, since they add further flows. An A that depends on the time excludes them too, since
-    the conjugate of the time belongs to A.
+    Forces exclude these methods, since forces add further flows. An A that depends on the time also excludes these
+    methods, since the conjugate of the time belongs to A.
     """
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 

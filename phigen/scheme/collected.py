@@ -64,7 +64,7 @@ def collect(
 
     A tower is a polynomial ring over the rationals with function values as variables. ``times`` are symbols of the
     time, if H depends on it. Then the coefficients may depend on the time; each is written as a polynomial in values
-    such as sin(t), whose own coefficients depend on parameters only.
+    such as sin(t), whose own coefficients depend only on parameters.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
     static = [i for i in range(len(tower.names)) if i not in state and i not in dated]

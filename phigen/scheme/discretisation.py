@@ -247,7 +247,7 @@ def _composed(
 
 
 def is_large(system: System) -> bool:
-    """Whether a system of this dimension is so large that `expect_affordable` must count the operations for S_1 = H."""
+    """Whether a system has so many coordinates that `expect_affordable` must count the operations for S_1 = H."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 

@@ -20,7 +20,7 @@ from phigen.scheme.steps import Gauss
 #: Nanoseconds of an arithmetic operation in straight-line code, and of a call of an elementary function.
 OPERATION, FUNCTION = 0.5, 7.0
 #: Nanoseconds of an explicit step in addition to its operations: the compensated sums of the coordinates, and the time
-#: for which each flow waits for the results of the flow before.
+#: for which each flow waits for the results of the preceding flow.
 EXPLICIT_STEP = 25.0
 #: Flows that change different coordinates need not wait for one another. So the time of the operations is divided by
 #: n/WAITING_COORDINATES in dimension n. This divisor is at least 1 and at most MOST_PARALLEL. Without the division, the

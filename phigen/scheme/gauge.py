@@ -24,9 +24,9 @@ from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbol
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: The solver chooses the multiple λ of a Casimir C only if λ makes the series little longer. The number of terms of
-#: S_1, S_2 and S_3 for H − λC, divided by that for H, must not exceed this ratio. Beyond it, the additional terms cost
-#: more than the smaller error gains.
+#: The solver chooses the multiple λ of a Casimir C only if the subtraction of λC adds few terms to the series: the
+#: number of terms of S_1, S_2 and S_3 for H − λC, divided by that for H, must not exceed this ratio. Above this ratio,
+#: the additional terms cost more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
 #: The gauge makes the error h^i π∇S_i of one term S_i of the generating function small. This is its index i.
@@ -34,8 +34,8 @@ GUIDE = 3
 
 #: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches for a gauge.
 #: The search evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ. At this limit it takes some
-#: ten million operations, a hundredth of a second, at the start of each trajectory. The systems of the corpus need at
-#: most 2,600 operations.
+#: ten million operations, a hundredth of a second, at the start of each trajectory. The example systems in ``specs``
+#: need at most 2,600 operations.
 MOST_GUIDE_OPERATIONS = 10_000
 
 

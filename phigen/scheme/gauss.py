@@ -230,7 +230,7 @@ def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
     """Return the kernel with the whole table of coefficients as its input.
 
-    Its input so far is the part of the table that existed when the kernel was built.
+    The input of the given kernel is the part of the table that existed when that kernel was built.
     """
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named

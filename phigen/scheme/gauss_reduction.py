@@ -1,7 +1,7 @@
 """Gauss sweeps over a part of the unknowns, if linear equations give all other unknowns.
 
 An example is q̇ = M⁻¹p with ṗ = −∇V(q): the sweeps iterate p alone. In general a *follower* f has ḟ = r₀ + Σ_k c_k z_k
-with constants r₀ and c_k, and the derivatives of the other unknowns z_k depend on followers only. The unknowns are
+with constants r₀ and c_k, and the derivatives of the other unknowns z_k depend only on followers. The unknowns are
 offsets from the start of the step, where they are 0. The Gauss method has the nodes τ_i, the weights b_j and the matrix
 A with the entries a_ij. L_k,j = h b_j ż_k is the increment of z_k at stage j. So z_k at stage i is Σ_j μ_ij L_k,j with
 μ_ij = a_ij/b_j. Let ν be the product of the matrices A and μ. Then f at stage i, and its value f' at the end of the

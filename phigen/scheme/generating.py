@@ -1,7 +1,7 @@
 """The generating function S_h = Σ h^i S_i as formulas: its gradient and Hessian in the cheapest form.
 
 Two forms are compared by their operation counts. *Collected*: S_h is one polynomial in coordinates and function values,
-with coefficients that depend on parameters and h only. ``prepare`` computes these coefficients once, for all orders in
+with coefficients that depend only on parameters and h. ``prepare`` computes these coefficients once, for all orders in
 h together. Each derivative is evaluated in nested Horner form. *Graph*: the recursion for the S_i is not expanded, but
 differentiated as a graph of shared sub-expressions. In low dimension the collected form is much cheaper; in high
 dimension its expansion is too large.
@@ -44,7 +44,7 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """The covector p that rotates a body in a step. It omits forces, which act on the momentum only."""
+        """The covector p that rotates a body in a step. It omits forces, since they act only on the momentum."""
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:

@@ -11,7 +11,8 @@ from enum import Enum, auto
 
 from phigen.symbolic.expression import Expression
 
-#: Arguments of kernels that are single numbers, not arrays: h is the step size or the duration of a flow, t the time.
+#: Names of those arguments of kernels whose values are numbers, not arrays: h is the step size or the duration of a
+#: flow, t the time.
 SCALARS = ("h", "t")
 
 #: Input of a transposed kernel. If coefficients are entries of matrix exponentials exp(tA), this input has the

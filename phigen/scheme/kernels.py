@@ -195,7 +195,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
 
 
 def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
-    """Return the kernel, without loops, of the inverse of a matrix J and of the product K J⁻¹.
+    """Return the kernel that computes J⁻¹ and K J⁻¹ for a matrix J.
 
     K is the derivative of the increment β − α; it is 2(1 − J) if the step is ``centred``.
     """

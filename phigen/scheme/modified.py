@@ -38,7 +38,7 @@ def corrections(
 ) -> ModifiedSeries:
     """Return the terms H_k of the modified Hamiltonian Σ h^k H_k, including the first ``count`` corrections.
 
-    The Casimirs of the ``gauge`` are subtracted from H before. The ring of the terms also contains the step size.
+    First the Casimirs of the ``gauge`` are subtracted from H. The ring of the terms also contains the step size.
     Numbers in ``values`` replace parameters, which shortens formulas. Raises `LimitError` if a correction is too large.
     """
     gauge = gauge or Gauge()

@@ -67,8 +67,8 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 def monitor_of(spec: Spec) -> Expression | None:
     """Return the monitor g of a spec whose steps have a generating function, or None.
 
-    Raises `SpecError` if the monitor is ``log``. A lattice, a time in H, or a gauge together with forces exclude a
-    monitor, and raise the same error.
+    Raises `SpecError` if the monitor is ``log``, for a lattice, and if H depends on the time. It also raises
+    `SpecError` if the system has forces and the spec states multiples of Casimirs as gauge.
     """
     if spec.monitor is None:
         return None

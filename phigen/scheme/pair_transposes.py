@@ -33,9 +33,10 @@ def transposed_at_ends(
     """Return the loops over bonds or pairs in which each site collects its own cotangents.
 
     No two sites write to the same place. A loop is given by the end at which the site lies, the bonds or pairs, and the
-    kernel. If the bonds of a site are the same at both ends, there is one loop. If ``summed``, its kernel also computes
-    the sums that are transposed. Otherwise there are two loops. In the first loop the site is the end b of the bonds,
-    and the cotangents of the sites at the ends a are read. In the second loop the site is the end a.
+    kernel. There is one loop if ``ends`` is for both sites of every bond or pair. With ``summed``, the kernel of this
+    loop also computes the sums that are transposed. There are two loops if ``ends`` selects an end or a colour. In the
+    first of the two the site is the end b of the bonds, and the cotangents of the sites at the ends a are read. In the
+    second the site is the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)
@@ -52,7 +53,7 @@ def transposed_at_ends(
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
     """Return a transposed kernel with 0 in place of the cotangents that do not belong to the site at ``end``.
 
-    Other cotangents, such as those of parameters of bonds, are computed for the end b only.
+    Other cotangents, such as those of parameters of bonds, are computed only for the end b.
     """
     outputs = []
     for o in kernel.outputs:

@@ -199,8 +199,9 @@ class _PathBuilder:
         return moving
 
     def _as_series(self, e: Expression) -> int:
-        """Return the number of the series of a node; a value that is constant along the path becomes a series with
-        order 0 only."""
+        """Return the number of the series of a node; a value that is constant along the path becomes a series with the
+        single order 0.
+        """
         if id(e) not in self._series_of:
             value = self._value(e)
             self._series_of[id(e)] = len(self.series)

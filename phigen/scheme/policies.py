@@ -1,5 +1,5 @@
-"""Numerical constants of the runtimes in all languages: for the ends of iterations, for predictors, and for the search
-for a gauge.
+"""Numerical constants of the runtimes in all languages: tolerances and limits of iterations, and constants of
+predictors and of the search for a gauge.
 
 Each constant is defined once, with its reason, and is printed into C, JavaScript and NumPy (`phigen.targets.policies`).
 Constants that only one runtime has, such as the number of steps in a block in C, are in the files of that runtime.
@@ -49,9 +49,10 @@ class StartPolicy(Policy):
 
 @dataclass(frozen=True)
 class MeasurePolicy(Policy):
-    """The size of a correction of y, the solution of the implicit equation, relative to the components of y.
+    """The size of a correction of y, the solution of the implicit equation: the largest ratio of |correction of y_i| to
+    |y_i| + ``floor`` max |y_j|.
 
-    ``floor`` is 0 if the coordinates keep their signs, since these coordinates may differ much in size.
+    ``floor`` is 0 if the coordinates keep their signs, since the sizes of these coordinates may differ much.
     """
 
     floor: float = number(1e-6, "a correction is relative to |y_i| + this fraction of the largest |y_j|")
@@ -70,7 +71,8 @@ class PathPolicy(Policy):
     """The solution of the equation for p in a step along paths dm/dt = π(m)p, and the Taylor series of a path.
 
     A long path is divided into pieces, each of which has a Taylor series. ``longest_path`` and ``most_pieces`` were
-    measured on the corpus: steps that need more pieces usually have errors as large as the state.
+    chosen by measurements with the example systems in ``specs``: steps that need more pieces usually have errors as
+    large as the state.
     """
 
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")

@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. On lattices an input has the same name. It holds
-#: those fields after the flow that the kernel reads for this output only.
+#: Name of an output of a transposed flow: the state before the flow. On lattices an input has the same name. This input
+#: has fields after the flow, namely those that the kernel needs for this output and for no other.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
@@ -52,7 +52,7 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
 
     ``changes`` are the increments of the inverse flow. Sub-expressions are not computed again if it is proved that the
     flow does not change them. Two kinds of sub-expressions are tried: sums, such as the sum of two spins that rotate
-    about it, and arguments of functions, such as |ψ|² in a flow that changes phases only.
+    about it, and arguments of functions, such as |ψ|² in a flow that changes only phases.
     """
     previous = {s: symbol(s) + change for s, change in changes.items()}
 

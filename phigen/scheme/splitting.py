@@ -181,8 +181,8 @@ def _clock(choice: ScheduledMethod) -> str:
 
 
 def _named(system: System, flow: Flow, k: int) -> str:
-    """Return a description of the flow number k, from 1 on: its Hamiltonian, or its number if it is the flow of a
-    force.
+    """Return a description of flow ``k``, counted from 1: its Hamiltonian or, for the flow of a force, a name such as
+    F_2.
 
     The flows of noise sources have the first numbers.
     """
@@ -227,7 +227,7 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
 def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
     """Raise `SpecError` for features that a method with a corrector does not offer, such as noise, forces or a monitor.
 
-    Most of them need the state after each single step, which exists only at the end of a run.
+    The message has the reason.
     """
     refused = {
         "time": (bool(system.time), "the flows of the corrector would need other times than the steps"),

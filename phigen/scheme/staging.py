@@ -2,9 +2,9 @@
 
 There are three kinds of symbols. *Static* symbols, parameters and the step size, are known before the first step.
 *Inputs* of a step, such as the time in its middle, are new in every step. All other symbols belong to the state and
-change with every evaluation. The kernel ``prepare`` computes, before the steps, the values that depend on static
-symbols only. The kernel ``refresh`` computes, once in every stage of a step, the values that also depend on inputs.
-Both fill one table of coefficients ``c:0``, ``c:1``, …, with the static values first.
+change with every evaluation. The kernel ``prepare`` computes, before the steps, the values that depend only on static
+symbols. The kernel ``refresh`` computes, once in every stage of a step, the values that also depend on inputs. Both
+fill one table of coefficients ``c:0``, ``c:1``, …, with the static values first.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The kernels of a step are evaluated at three different times. ``prepare`` computes the coefficients ``c:0``, ``c:1``, …
 from parameters and step size, before the steps. If H depends on the time, or if there is noise, ``refresh`` computes
 further coefficients once in each stage, from the time in the middle of the stage or from the noise increments. All
-other kernels read the coefficients and the state only.
+other kernels read only the coefficients and the state.
 """
 
 from __future__ import annotations
@@ -121,8 +121,9 @@ class _Staged:
 
     @property
     def lifted(self) -> Gauss | None:
-        """The same Gauss step with group elements that start at frames F instead of 1; None if there is no such
-        form."""
+        """The Gauss step in its form with frames: group elements start at frames F instead of 1. None if the step has
+        no form with frames.
+        """
         return None
 
     @property
@@ -379,7 +380,7 @@ class GaussTangent:
 class ReducedSweeps:
     """Sweeps over a part of the unknowns of a Gauss step; all lists contain indices of unknowns.
 
-    The derivatives of the ``iterated`` unknowns depend on the ``followers`` only. The derivatives of the followers are
+    The derivatives of the ``iterated`` unknowns depend only on the ``followers``. The derivatives of the followers are
     linear functions of the ``integrated`` unknowns, which are some of the iterated ones. Both kernels read the
     integrals of the integrated unknowns from the start of the step to a stage. ``slope`` computes the derivatives of
     the iterated unknowns, ``follow`` the followers.
@@ -560,14 +561,15 @@ class Sites:
 
 @dataclass(frozen=True)
 class Ends:
-    """A ``kernel`` for the bonds or pairs between a site, called a here, and another site, called b.
+    """A ``kernel`` for the bonds or pairs between the site of a loop and another site.
 
-    The inputs of the kernel are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters of the bond. The user
-    also names the ends of a bond "a" and "b"; ``end`` is the name of the end at which the site lies, or "" for both
-    ends. ``chosen`` says which of the two sites must have the colour of the sweep: ``here`` (a), ``there`` (b), or ""
-    for neither. ``extremes`` maps the index of an output to ``max`` or ``min``, if this output is reduced in this way;
-    all other outputs are summed. For pairs, b runs over the sites from number ``first`` on. If the kernel is
-    ``massive``, the sites after the last one with a nonzero mass are omitted, since they contribute nothing.
+    The inputs of the kernel are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters of the bond. ``end``
+    selects the bonds that begin at the site of the loop ("a"), the bonds that end at this site ("b"), or all bonds of
+    the site (""). ``chosen`` says which site must have the colour of the sweep: ``here`` (the site of the loop),
+    ``there`` (the other site), or "" for neither. ``extremes`` maps the index of an output to ``max`` or ``min``, if
+    this output is reduced in this way; all other outputs are summed. For pairs, the other sites are those from number
+    ``first`` on. If the kernel is ``massive``, the sites after the last one with a nonzero mass are omitted, since they
+    contribute nothing.
     """
 
     kernel: Kernel
@@ -759,8 +761,8 @@ class Sweeps(_Scheduled):
         """Whether a caller can make the sweeps of a step one by one, on planes of the lattice.
 
         This is offered for splittings on grids. Noise is drawn by the sweep that reads it, so no sweep may read the
-        noise of a neighbour. There must be no seam: a seam lies at the end of the whole lattice, and a caller may have
-        a part of the lattice only.
+        noise of a neighbour. There must be no seam: a seam lies at the end of the whole lattice, and the caller may
+        have only a part of the lattice.
         """
         reads_neighbour_increments = any(
             base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()

@@ -1,5 +1,5 @@
-"""Transposed sweeps of lattices in two forms. In the collecting form, a site computes all contributions to its
-cotangents, including those of its neighbours.
+"""Transposed sweeps of lattices in two forms. In the collecting form, a site computes all contributions to its own
+cotangents, including the contributions that come from its neighbours.
 
 In the storing form, a neighbour computes its contribution and stores it for the site. Collecting is faster if
 contributions are cheap, such as those of springs: the site reads the fields of its neighbours anyway, and only their

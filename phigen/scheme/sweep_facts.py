@@ -106,8 +106,8 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 def takes(program: Program, step: Sweeps) -> bool:
     """Whether the loop of the next flow adds the cotangents that a flow passes to other sites of a grid.
 
-    Otherwise separate loops add them. Loops that add cotangents have long code, and are used in the profile ``fast``
-    only.
+    Otherwise separate loops add them. Loops that add cotangents have long code, and are used only in the profile
+    ``fast``.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
@@ -148,8 +148,9 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether a row may receive cotangents from rows that it does not read. This is so if an axis other than the last
-    one has open ends.
+    """Whether each row needs a list of the rows that contribute to its cotangents, apart from the list of the rows that
+    it reads. The lists differ if an axis across rows has open ends: beyond such an end, a row reads a mirrored row with
+    weight 0, but receives nothing.
     """
     return any(step.sites.open[:-1])
 
