@@ -16,7 +16,7 @@ from phigen.certify.reader import GeneratedC, PathReader
 CARRY = 1.01
 
 #: Least contraction rate that certificates assume. The C estimates this rate to decide when the iteration for a Gauss
-#: step ends. In runs of the corpus the rate is between 0.05 and 0.5.
+#: step ends. In runs of the example systems in ``specs`` the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
 Stage = dict[str, Any]

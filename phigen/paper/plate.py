@@ -38,7 +38,7 @@ class Plate:
 
 
 def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[Compilation, Solver]:
-    """Return a system of the corpus, compiled with the order ``order``, and its C solver.
+    """Compile the example system ``name`` with the order ``order``. Return the compilation and the C solver.
 
     ``birealisation`` names the kind of bi-realisation, by default that of the spec. Raises `ToolchainError` without a C
     compiler: NumPy would take too long for the runs of the paper.

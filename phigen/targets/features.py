@@ -87,7 +87,7 @@ def holds(condition: str, switches: Mapping[str, bool]) -> bool:
 
 
 def switches(program: Program, further: Iterable[Feature] = ()) -> dict[str, bool]:
-    """Return the values of all switches for a program, by name; ``further`` are switches of one language only."""
+    """Return the values of all switches for a program, by name; ``further`` are switches of a single language."""
     values: dict[str, bool] = {}
     for feature in (*FEATURES, *further):
         asked = bool(feature.when(program)) and program.offers(feature.part)

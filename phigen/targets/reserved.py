@@ -84,7 +84,7 @@ _SIGINFO = """addr addr_lsb arch band call_addr fd int lower overrun pid pkey pt
 utime value"""
 _ATOMIC = "init|load|store|exchange|compare_exchange_strong|compare_exchange_weak|fetch_(add|and|or|sub|xor)"
 
-#: Families of reserved names: all names with an initial underscore, and macros whose names differ in one part only.
+#: Families of reserved names: all names with an initial underscore, and macros whose names differ in a single part.
 _C_FAMILIES = (
     r"_\w*",
     rf"({_INTEGERS}|SIG_ATOMIC|WCHAR|WINT)_(MAX|MIN|WIDTH)",

@@ -37,8 +37,8 @@ class Dialect:
     select: str = "{0} ? {1} : {2}"
     subscript: str = "{0}[{1}]"
     member: str = "{0}.{1}"
-    pointers: frozenset[str] = frozenset()  # parameters that are addresses of records
-    links: frozenset[str] = frozenset()  # members of records that are addresses of records
+    pointers: frozenset[str] = frozenset()  # names of parameters whose values are addresses of records
+    links: frozenset[str] = frozenset()  # names of members of records whose values are addresses of other records
     quote: str = '"{0}"'
 
 

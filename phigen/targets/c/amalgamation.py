@@ -1,9 +1,9 @@
 """Assembly of the C runtime for one solver.
 
-The files of ``templates/c/runtime`` are valid C99, with the prefix ``phi_`` and with switches and sizes
-(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. This module processes these files as a preprocessor would: it
-resolves ``#include "…"``, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`). It also
-removes static functions that nothing calls (`phigen.targets.c.unused`). All other directives remain.
+The files of ``templates/c/runtime`` are valid C99, with the prefix ``phi_``. They contain switches and sizes
+(``PHI_BLOCKS``, ``PHI_DIM``), whose values depend on the solver. This module processes these files as a preprocessor
+would: it resolves ``#include "…"``, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`). It
+also removes static functions that nothing calls (`phigen.targets.c.unused`). All other directives remain.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from phigen.targets.c.tokens import lines_with
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
 
-#: Names of phrases. The names that belong to the model are in `phigen.targets.c.language`.
+#: Names of the phrases, which this module replaces by their texts.
 _PHRASES = phrases.names()
 _PREFIX = re.compile(r"\b(?:phi|PHI)_")
 

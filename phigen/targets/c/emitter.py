@@ -1,7 +1,7 @@
 """Emission of a program as C source: `NAME.h` and `NAME.c`.
 
-The parts that depend on the model are printed: sizes, constants, kernels (`printed`). All other code is the runtime: C
-in ``templates/c/runtime``, which `amalgamation` assembles for the `features` of the program.
+The parts that depend on the formulas of a system are printed: sizes, constants, kernels (`printed`). All other code is
+the runtime: C in ``templates/c/runtime``, which `amalgamation` assembles for the `features` of the program.
 """
 
 from __future__ import annotations
@@ -145,7 +145,9 @@ def _is_chapter(line: str) -> bool:
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
-    """Return the texts that are printed for the model. Each has the name of a file that the runtime includes."""
+    """Return the texts that are printed for a program: a map from names of files, which the runtime includes, to their
+    texts.
+    """
     step = program.step
     texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
@@ -303,8 +305,8 @@ def _defaults(program: Program) -> str:
 
 
 def _member_comment(parameter: Parameter, member: str) -> str:
-    """Return the comment on a member of the parameter struct. If the name of the member differs from that of the
-    parameter in the spec, the comment has the latter.
+    """Return the comment on a member of the parameter struct. If the parameter has another name in the spec, the
+    comment begins with this name.
     """
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
     comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
@@ -351,7 +353,9 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
 
 
 def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
-    """Return the text of the constants and functions of the model; ``others`` are further printed texts."""
+    """Return the text of the file ``model.h``: the constants and functions of a program. ``others`` are further printed
+    texts.
+    """
     step = program.step
     body = functions.called(program, device=has["DEVICE"])
     kernels_of_step = text_of(program).kernels(step, has)

@@ -41,7 +41,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and p.step.kind.implicit, ("ADJOINT",))
-    blocked = blocks or traces  # their reverse pass has stages in lanes and rarely uses scalar code
+    blocked = blocks or traces  # blocks and traces run the reverse pass in lanes, and rarely use scalar code
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("REDUCED", lambda p: p.step.reduced, ("STAGED",))

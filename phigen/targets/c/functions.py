@@ -91,7 +91,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
     ``unprinted``.
 
     Special functions are φ, its derivatives, and the functions of `ENTIRE`. For a splitting, they include the functions
-    that its flows call. On a ``device``, φ is computed without a tangent.
+    that its flows call. On a ``device``, φ is computed without the library function tan.
     """
     # Loops over the sites of a lattice call other versions of elementary functions, so only the flows of systems
     # without a lattice count here.
@@ -119,9 +119,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
-    """Return the definitions of functions for loops over lanes. These functions are correct for small arguments
-    only.
-    """
+    """Return the definitions of functions for loops over lanes. The functions are correct only for small arguments."""
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
     texts = [

@@ -18,8 +18,8 @@ from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
 from phigen.targets.c.kernels import function
 
-#: Predictors fit linear recurrences to past solutions. WINDOW is the number of past values from which a recurrence
-#: computes the next value, a multiple of 8. FITTED is the number of values to which the recurrence is fitted. For large
+#: Predictors fit linear recurrences to past solutions. WINDOW is a multiple of 8: the number of past values from which
+#: a recurrence computes the next value. FITTED is the number of values to which the recurrence is fitted. For large
 #: systems, 112 values would need too much memory; the number is then smaller, but at least SMALLEST.
 WINDOW, FITTED, SMALLEST = 40, 112, 32
 
@@ -95,7 +95,7 @@ def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
     return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 
-#: The versions of elementary functions that loops over lanes call. Some versions are correct for small arguments only.
+#: The versions of elementary functions that loops over lanes call. Some versions are correct only for small arguments.
 _NEAR = {**SIMD, **{f: f + NEAR for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 

@@ -27,8 +27,8 @@ LANGUAGE = Language(
 
 @cache
 def reserved_members(name: str) -> Reserved:
-    """Return the names that members of structs must not have: reserved words, phrases of the runtime, macros of the
-    solver.
+    """Return the names that members of structs must not have: reserved words, phrases of the runtime
+    (`phigen.targets.c.phrases`), and macros of the solver.
     """
     return _extended(name, "[A-Z0-9_]*[A-Z0-9]")
 

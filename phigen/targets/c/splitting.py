@@ -103,8 +103,8 @@ def adjoint_in_lanes(
 ) -> list[str]:
     """Return the text of the transposes of the flows for batches of members in SIMD lanes.
 
-    The transposes call the versions ``near`` of elementary functions, some of which are correct for small arguments
-    only. A transpose that calls one of these is printed a second time, with the versions ``full_range`` for all
+    The transposes call the versions ``near`` of elementary functions. Some of these versions are correct only for small
+    arguments. A transpose that calls such a version is printed a second time, with the versions ``full_range`` for all
     arguments.
     """
     kernels, build = _transposed(program, step, back)

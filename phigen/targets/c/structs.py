@@ -62,8 +62,8 @@ MODEL = (
     ),
 )
 
-#: Members of the struct with the arguments of a run of an ensemble. An array has one value for each member, or one
-#: value for all members.
+#: Struct with the arguments of a run of an ensemble. Each array has one value for each trajectory, or one value for all
+#: trajectories.
 MEMBERS = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
@@ -118,7 +118,7 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: Members of the struct with the arguments of the reverse pass of an ensemble, without those that all solvers have.
+#: Struct with the arguments of the reverse pass of an ensemble, without the arguments that all solvers have.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),

@@ -29,9 +29,9 @@ class Spills:
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Measurements. If a step has at least as many coordinates and coefficients as a measured system, it spills at least
-#: about as many bytes as that system from registers to memory. Steps with fewer than 6 coordinates and at most 40
-#: coefficients do not spill. These rules hold for 52 builds of 19 systems of the corpus, with orders 2 to 6.
+#: Measurements. A step that has at least as many coordinates and coefficients as a measured system spills from
+#: registers to memory: about as many bytes as that system, or more. Steps with fewer than 6 coordinates and at most 40
+#: coefficients do not spill. These rules hold for 52 builds of 19 example systems in ``specs``, with orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),
@@ -49,8 +49,8 @@ _SINGLE = 2
 
 
 def spilling(program: Program) -> str:
-    """Return a warning with a hint if steps of an ordinary system need more registers than cards have; "" if they do
-    not.
+    """Return a warning with a hint if steps of a system need more registers than graphics cards have; else "". There
+    are no warnings for lattices.
     """
     step = program.step
     if step.kind.sites:

@@ -167,7 +167,7 @@ SOLVER = (
 )
 
 
-#: Blocks of lattices, which have options of the constructor only.
+#: Blocks of lattices. All of their fields are options of the constructor.
 LATTICE = (
     StateFields(
         options=(

@@ -83,10 +83,10 @@ class _Pulled:
     """A transposed kernel of a ``sweep`` or of a stage, and the arrays of its cotangents.
 
     The kernel reads the cotangents of the outputs of the original kernel, as symbols of the kind ``seed``. These
-    cotangents are in the arrays with the numbers ``bars`` or, if ``bars`` is empty, in the variation of the row.
-    ``gather`` has the sums that the kernel reads. ``ends`` has three items for each of these sums: its kernel, the
-    parameters that change sign at the end b of a bond, and its transpose. ``before`` are statements that a row segment
-    executes before the calls.
+    cotangents are in the arrays with the numbers ``bars``. If ``bars`` is empty, they are in the arrays ``varied`` of
+    the row record. ``gather`` has the sums that the kernel reads. ``ends`` has three items for each of these sums: its
+    kernel, the parameters that change sign at the end b of a bond, and its transpose. ``before`` are statements that a
+    row segment executes before the calls.
 
     The fields ``recomputed`` are recomputed by the kernel or, if ``undo`` is set, by the kernel ``undo``. The kernel
     ``undo`` reads sums that the transposes over bonds or pairs compute. ``taken`` are the contributions of the previous

@@ -36,8 +36,8 @@ class Layout(RowLayout):
     """
 
     halo: int = 0
-    # whether the code has kernels of derivatives along variations (tangent vectors of the fields); without these
-    # kernels, the solver takes differences of sweeps
+    # whether the code has kernels of derivatives along variations (tangent vectors of the fields); if not, these
+    # derivatives are computed as difference quotients of sweeps
     slopes: bool = True
 
     @property

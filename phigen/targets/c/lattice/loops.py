@@ -109,8 +109,9 @@ class RowLoops:
         """Return the versions of elementary functions that loops call. There is an entry for each suffix of names of
         loops.
 
-        If one of the ``loops`` calls a function that needs both, there is a form for small arguments and a form for all
-        arguments. ``rows`` has the data on loops over sites in SIMD lanes; if it is None, there is a single form.
+        There are two forms, for small arguments and for all arguments, if one of the ``loops`` calls a function whose
+        fast version fails at large arguments. ``rows`` has the data on loops over sites in SIMD lanes; if it is None,
+        there is a single form.
         """
         if rows is None:
             return {"": self.versions}

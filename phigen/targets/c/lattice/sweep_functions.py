@@ -184,7 +184,7 @@ class _PartLoops:
         """Return the calls that apply the flow of a part of H to a row segment, for each form of elementary
         functions.
 
-        In short code, sweeps that differ in the order of the fields only may share a loop.
+        In short code, sweeps may share a loop if they differ only in the order of the fields.
         """
         layout, program = self.loops.layout, self.loops.program
         forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
@@ -281,8 +281,8 @@ def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
 
 
 def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]:
-    """Yield the statements that skip rows and sites away from boundary seams, if the terms of a part of H occur near
-    seams only.
+    """Yield the statements that skip rows and sites away from boundary seams, if the terms of a part of H occur only
+    near seams.
     """
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
     rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near_seams")
