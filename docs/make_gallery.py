@@ -1,4 +1,4 @@
-"""Makes docs/gallery.md and its figures from the specs of the corpus: python docs/make_gallery.py [NAME …]"""
+"""Makes docs/gallery.md and its figures from the bundled specs: python docs/make_gallery.py [NAME …]"""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def lattices() -> list[str]:
 
 
 def source(name: str) -> Spec:
-    """A spec of the corpus."""
+    """The bundled spec ``name``."""
     return spec.load(resources.bundled()[name])
 
 

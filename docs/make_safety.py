@@ -30,7 +30,7 @@ FLAGS = ("-O2", "-ffp-contract=off")
 
 
 def small(name: str) -> Compilation:
-    """A system of the corpus in the profile for safety-related use."""
+    """The bundled system ``name`` in the profile for safety-related use."""
     return compile_spec(spec.load(resources.bundled()[name]).overridden(profile="certified"))
 
 

@@ -124,8 +124,8 @@ def continuation(stages: int) -> list[list[float]]:
 def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool = False) -> list[list[list[float]]]:
     """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
-    The first columns are for the stage increments L_j of the last step. Further columns are for the step before, if the
-    predictor reads it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of
+    The first columns are for the stage increments L_j of the last step. Further columns are for the preceding step, if
+    the predictor reads it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of
     `Tableau` defines.
     """
     nodes = gauss_nodes(stages)
