@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 6fb58035eb6f3ebf07b078e9d01b8435c08426ddda798e74118da4db1722942f
+ * body-sha256: fb2724e5a511a122c65a02303d594a96370db8372382f566a65b9ae0fe3a9527
  */
 #include "food_web.h"
 #include <limits.h>
@@ -42,8 +42,7 @@ static int food_web_part_of_flow(const food_web_solver *s, int *flow)
     return part;
 }
 
-/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
-   flows. */
+/* Duration of a flow, in steps, for each row of coefficients; the last merges two flows. */
 static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -116,8 +115,7 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
 
 enum { food_web_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
-   segment. */
+/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
 static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5498ccf3d879e92657904ec0d9ffd05843c52b234fb9839492efa26babafbf9d
+ * body-sha256: 89dde510f01780b85d7f7d0186b00c0a68c5a175ab1d91b26167b6bcd01c3ecb
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -83,9 +83,9 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range, and
-   arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
-   compensated steps. To restore the run, call food_web_init, then food_web_resume with these values. */
+/* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range and
+   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
+   steps. To restore, call food_web_init, then food_web_resume with these values. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,
     size_t full_range);

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: f2b1d9dfcc74e1bcdfb682359b0b74ab3ff8afff4266ac56c38467262c2ecb2f
+ * body-sha256: d1d6276b4777b0883106feed491091b6fb6c580e953c022d6c95175c67d9db20
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -42,8 +42,7 @@ static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 
-/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
-   flows. */
+/* Duration of a flow, in steps, for each row of coefficients; the last merges two flows. */
 static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
 /* For each row of coefficients, the part of H whose flow uses it. */

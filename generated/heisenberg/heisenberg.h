@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9a8b4cb854094d8f25d917f670eb1abfcc3a7fd97a6157cfad2391218d64626e
+ * body-sha256: 492adca9c518edbafd4e65aeac4ed3a2f2b030c0ec87e2b82895086c71a0ab73
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -80,9 +80,9 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
    refuses, and then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
-/* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range,
-   and arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
-   compensated steps. To restore the run, call heisenberg_init, then heisenberg_resume with these values. */
+/* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range and
+   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
+   steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t full_range);

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 6073845220d913156d80ae236a2ac1056fa178b791d7cbc0c4536b7dc0122ad2
+ * body-sha256: 0e35589a0a9a0568726154011dc529096628f4a1d773bd6f968bb9e0bb2664a5
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -98,8 +98,7 @@ static inline point_vortices_row point_vortices_row_of(const point_vortices_solv
 
 enum { point_vortices_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
-   segment. */
+/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
 static size_t point_vortices_units(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 944698353f9753e5035e3c36e3c01655b2a1f65992cc2654a1f575304161e43a
+ * body-sha256: 08e4246f5d6626d4325211e7aeb911c5225282f980f1e8c1571291407f46480e
  */
 #include "toda.h"
 #include <math.h>
@@ -32,8 +32,7 @@ enum { toda_FLOWS = 13 };         /* number of flows in a step */
 /* Along each axis: the smallest number of sites. */
 static const size_t toda_least[toda_AXES] = { 2 };
 
-/* Durations of the flows, as fractions of a step, one for each row of coefficients; the last merges two
-   flows. */
+/* Duration of a flow, in steps, for each row of coefficients; the last merges two flows. */
 static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
@@ -107,8 +106,7 @@ static inline toda_row toda_row_of(const toda_solver *s)
 
 enum { toda_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single
-   segment. */
+/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
 static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;

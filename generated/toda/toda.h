@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b879e94cc191bf3d6f5f4064d676c1044e57884da861cbc8224b3b30e9462bfc
+ * body-sha256: 716233cb734eea1b59ad603e595ee7c6fc80d3e8e73583b7d89aa6b41f0f7dbf
  */
 #ifndef TODA_H
 #define TODA_H
@@ -68,9 +68,9 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range, and
-   arrays x[array][site]; it returns the number of arrays: at most one for each field, or three with
-   compensated steps. To restore the run, call toda_init, then toda_resume with these values. */
+/* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range and
+   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
+   steps. To restore, call toda_init, then toda_resume with these values. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *full_range);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

@@ -27,7 +27,7 @@ enum { PHI_PIECE = 256 }; /* sites of a work item, for any number of threads */
 enum { PHI_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 #endif
 
-/* Number of segments of the row. The last segment is the longest, so that each halo is copied from a single segment. */
+/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
 static size_t phi_units(const phi_solver *s)
 {
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
