@@ -1,5 +1,5 @@
 """Group elements that are matrices, minus 1: exp(P) and the Cayley transform of P = Σ p_i E_i, as formulas without
-loops.
+loops. The E_i are the basis matrices of the Lie algebra.
 
 By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix with N rows. So all powers of P, and the series
 of exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors satisfy a recurrence. Computing P², …, P^{N−1} takes
@@ -30,8 +30,7 @@ Flat = list[Expression]
 
 
 def size_of(group: Group, p: Sequence[Expression]) -> Expression:
-    """Return an upper bound for the squared modulus of the largest eigenvalue of P = Σ p_i E_i, with the basis matrices
-    E_i of the Lie algebra.
+    """Return an upper bound for the squared modulus of the largest eigenvalue of P = Σ p_i E_i.
 
     The bound is the sum of the squares of all entries of P or, if all E_i are skew, half of this sum.
     """
@@ -40,7 +39,9 @@ def size_of(group: Group, p: Sequence[Expression]) -> Expression:
 
 
 def exponential(group: Group, p: Sequence[Expression]) -> Flat:
-    """Return the entries of exp(P) − 1 for P = Σ p_i E_i, by a series that is accurate if `size_of` is at most 1/4."""
+    """Return the entries of exp(P) − 1 for P = Σ p_i E_i. They are computed by a series that is accurate if `size_of`
+    is at most 1/4.
+    """
     powers, (first, *recurrence) = _powers(group, p), [*_symmetric(group, p)]
     assert first is ONE
     rows = len(powers) + 1
@@ -83,7 +84,7 @@ def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
     """Yield the elementary symmetric functions of the eigenvalues of P = Σ p_i E_i, from 1 to the determinant.
 
-    If all basis matrices E_i of the Lie algebra are skew, the functions of odd degree are 0.
+    If all E_i are skew, the functions of odd degree are 0.
     """
     powers = _powers(group, p)
     rows = len(powers) + 1

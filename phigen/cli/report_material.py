@@ -140,9 +140,8 @@ def _opening(
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
-    """Return the content with the variation of the modified Hamiltonian along the run.
-
-    If the variation was not measured, the content has the reason instead.
+    """Return the content with the changes of the modified Hamiltonian along the run or, if these were not measured,
+    with the reason.
     """
     from phigen.cli.verify import constancy_of
     from phigen.study.backward import NotOfferedError

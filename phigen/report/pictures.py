@@ -67,7 +67,7 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
 
 
 def constancy_picture(constancy: Constancy) -> Markup:
-    """Return the figure of the variation of the modified Hamiltonian along a run."""
+    """Return the figure of the changes of the modified Hamiltonian along a run."""
     largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the "
     caption += "expected slopes. The dotted line is one unit in the last place of a double."

@@ -44,7 +44,8 @@ def beside_seams(sweep: Sweep) -> bool:
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the code of the sites of colour 0 that a sweep with a ``window`` updates; None without a window.
+    """Return the code of the sites of colour 0 that a sweep updates, if it updates sites near certain boundary seams
+    only. Returns None for other sweeps.
 
     The runtime marks each site near seams with a code. The code is m·c + k, where m is the bit mask of these seams, c
     the number of colours, and k the colour of the site.

@@ -302,8 +302,8 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions. If a function differs from an earlier function only in its colour or window, its body
-    becomes a call of the earlier function.
+    """Yield the functions. If a function has the same body as an earlier one, the body is replaced by a call of the
+    earlier function.
     """
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:
