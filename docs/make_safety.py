@@ -71,17 +71,17 @@ def rows_of_rules() -> list[str]:
 
 #: Rules of MISRA C:2012 that generated C does not keep everywhere, with the reasons.
 REASONS = {
-    "2.4": "structs are typedefs without a use of their tag, so that a tag cannot clash",
+    "2.4": "structs are named by typedefs, and their tags are not used, so that no tag can clash with a name",
     "2.5": "macros that say orders, versions and checksums are for the code that includes the header",
     "8.7": "functions of the interface are called by the code that uses the solver",
     "9.3": "`{0}` sets all of an array to zero",
-    "10.3": "results of comparisons are stored as int, and counts of members converted to size_t",
+    "10.3": "results of comparisons are stored as int, and counts of members are converted to size_t",
     "10.4": "a size_t is compared with an enumeration constant",
     "10.8": "a count of steps becomes a double, exact below 2⁵³",
     "12.3": "several variables are declared in one line where they belong together",
-    "13.3": "an index is decremented inside the subscript of the one loop that runs over coefficients backwards",
-    "15.5": "arguments that are not valid are refused at the top of a function",
-    "17.8": "NULL for the parameters is replaced by the address of those of the spec, and counts are counted down",
+    "13.3": "one loop runs backwards over coefficients, and decrements its index inside a subscript",
+    "15.5": "functions return early if an argument is not valid",
+    "17.8": "functions change arguments: NULL becomes the address of the default parameters, and counts are counted down",
     "18.4": "an address in a table of quaternions is computed with +",
 }
 CATEGORIES = dict.fromkeys(REASONS, "required") | dict.fromkeys(
