@@ -81,7 +81,7 @@ REASONS = {
     "12.3": "several variables are declared in one line where they belong together",
     "13.3": "one loop runs backwards over coefficients, and decrements its index inside a subscript",
     "15.5": "functions return early if an argument is not valid",
-    "17.8": "functions change arguments: NULL becomes the address of the default parameters, and counts are counted down",
+    "17.8": "functions change arguments: NULL becomes the address of the defaults, and counts are counted down",
     "18.4": "an address in a table of quaternions is computed with +",
 }
 CATEGORIES = dict.fromkeys(REASONS, "required") | dict.fromkeys(
