@@ -99,7 +99,7 @@ class _Compiled(ABC):
 
     @property
     def in_double(self) -> Self:
-        """The same compilation, but with a program in double precision."""
+        """This compilation, but with a program in double precision."""
         program = self.program
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
@@ -154,7 +154,7 @@ class _Compiled(ABC):
 
     @property
     def monitor(self) -> Expression | None:
-        """The monitor g of dt = g dτ, with which steps have equal size in τ; None without a monitor."""
+        """The monitor g of dt = g dτ, with which steps have equal size in τ; None if there is none."""
         return None
 
     @property
@@ -239,7 +239,7 @@ class _CompiledSystem(_Compiled, ABC):
 
     @property
     def monitor(self) -> Expression | None:
-        """The monitor g of dt = g dτ, with which steps have equal size in τ; None without a monitor."""
+        """The monitor g of dt = g dτ, with which steps have equal size in τ; None if there is none."""
         return self.gauge.monitor
 
     @abstractmethod

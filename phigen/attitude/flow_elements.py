@@ -118,7 +118,7 @@ def _of_square(function: str, square: Expression) -> Expression:
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
     """Return for each flow its part of H as a sum of functions with known group elements.
 
-    Raises `SpecError` that names the first part for which phigen knows no such sum.
+    Raises `SpecError` if phigen does not know this sum for a part; the error names the first part of this kind.
     """
     return [_turning(system, group, flow, f"H_{k}", put_back=put_back) for k, flow in enumerate(flows, 1)]
 
@@ -140,7 +140,7 @@ def turning_of(
     """Return the function h as a sum of functions with known group elements; ``pieces`` are its commuting summands, if
     any.
 
-    Raises `SpecError` with the ``name`` of h if phigen knows no such sum.
+    Raises `SpecError` with the ``name`` of h if phigen does not know this sum.
     """
     orders = permutations(pieces) if len(pieces) <= MOST_PIECES else iter([tuple(pieces)])
     for candidate in chain(_candidates(system, group, h), (Turning(ZERO, order) for order in orders if order)):

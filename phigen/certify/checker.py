@@ -26,7 +26,7 @@ U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(
 ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the C computes
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
 POINTS = (0.318309886, 0.577215665, 0.869604401)  # fractions of a box, at which derivatives are compared
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions whose error, as documented by glibc, is twice that of the others
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of other functions
 # the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
@@ -35,7 +35,7 @@ LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "cosh": (arb.cosh, arb.sinh), "tanh": (arb.tanh, lambda x: 1 - square(x.tanh())),
 }  # fmt: skip
 EXACT = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
-OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # name → value, and derivatives by the operands
+OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # name → value and partial derivatives
     "add": lambda x, y: (x + y, ONE, ONE), "sub": lambda x, y: (x - y, ONE, -ONE), "neg": lambda x: (-x, -ONE),
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
@@ -146,8 +146,8 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # The sum of the omitted terms of a Taylor series is bounded by three times the next terms. The factor 3
-            # covers derivatives too.
+            # The C may omit the terms a[3:] of a Taylor series, and omits all later terms. The bound contains the terms
+            # a[3:] and the first later term. The factor 3 covers all other terms, and derivatives.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]

@@ -45,8 +45,8 @@ GAUSS_CARRY = 3.03
 #: this fraction of the largest one, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
-#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for C with
-#: difference quotients. The addition is larger than the differences of the unknowns in these quotients.
+#: If the C computes derivatives by difference quotients, the bound for the distance of iterates from the solution is
+#: enlarged by this fraction of each unknown. This is more than the differences of the unknowns in the quotients.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.

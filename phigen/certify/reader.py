@@ -75,8 +75,8 @@ class GeneratedC:
 class KernelReader:
     """The operations of one C function, in their order. A value that the C uses several times occurs once.
 
-    ``outputs`` maps each array that the function writes to the operations that compute its entries, given by index. The
-    constructor adds functions that the C computes by polynomials to ``series``.
+    ``outputs`` maps each array that the function writes to the operations that compute its entries, given by index. If
+    the C computes a function by a polynomial, the constructor adds this function to ``series``.
     """
 
     def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:

@@ -99,8 +99,8 @@ class _Gauge(dict[int, int]):
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the operations that compute the coefficients of a stage, or those of flows with the same duration, and
-    return the indices of the coefficients.
+    """Append the operations that compute one row of coefficients, and return the indices of the coefficients. Row
+    number ``stage`` belongs to one stage or, in a splitting, to all flows of one duration.
 
     The coefficients depend on parameters, step size and time.
     """

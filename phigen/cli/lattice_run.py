@@ -296,7 +296,7 @@ def _formatted_error(error: float) -> str:
 
 
 def section_text(run: Run) -> str:
-    """Return the expression of a section as readable text; "" without a section."""
+    """Return the expression of a section as readable text; "" if there is no section."""
     from phigen.symbolic.readable import readable
 
     return readable([run.section])[0] if run.section is not None else ""

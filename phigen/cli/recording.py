@@ -132,7 +132,7 @@ class Recorder:
 
     @property
     def section_text(self) -> str:
-        """The expression of the section as readable text; "" without a section."""
+        """The expression of the section as readable text; "" if there is no section."""
         section = self.experiment.run.section
         return readable([section])[0] if section is not None else ""
 

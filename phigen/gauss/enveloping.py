@@ -11,8 +11,8 @@ on Sym² g. The products of elements of g with a, b in g and f in S are
 
 Here κ is the Killing form, σ the projection on S, and τ the transpose of σ. a▷f is the action of a on f, ι is an
 isomorphism of g and S, and ⟨a, ι(b)⟩ = κ(a, b). The condition that these products represent g gives linear equations
-for c, μ and ν. All other products follow from them. The Lie algebras gl(n) and u(n) have the star algebras of sl(n) and
-su(n), where z spans their centre.
+for c, μ and ν. All other products in A follow from the three products above. The Lie algebras gl(n) and u(n) have the
+star algebras of sl(n) and su(n), where z spans their centre.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from phigen.symbolic.tower import rational
 #: MOST_UNKNOWNS.
 MOST_SIMPLE = 21
 
-#: Largest number of nonzero structure constants of a star algebra. Those of Lie algebras that phigen knows by name have
-#: at most 1,700, also after permuting and scaling the basis. For so(5) in a dense basis there are 4,000: then the
-#: tangent map of a stage takes 120,000 operations, more than programs may have.
+#: Largest number of nonzero structure constants of a star algebra. For the Lie algebras that phigen knows by name there
+#: are at most 1,700 of these constants, also after permuting and scaling the basis. For so(5) in a dense basis there
+#: are 4,000. Then the tangent map of a stage takes 120,000 operations, more than programs may have.
 MOST_TERMS = 2000
 
 
@@ -136,8 +136,9 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
     """Yield the candidates for the module S of symmetric elements in a star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-    Candidates are the modules that exist for a Lie algebra g of this dimension. Modules with the smallest A come first.
-    ``ad`` are the adjoint matrices of g, and ``centre`` is the dimension of the centre of g.
+    There is a candidate for each family, sl(n), so(n) or sp(2n), in which a Lie algebra has the dimension of g. Modules
+    with the smallest dimension come first. ``ad`` are the adjoint matrices of g, and ``centre`` is the dimension of the
+    centre of g.
     """
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])

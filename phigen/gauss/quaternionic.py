@@ -131,7 +131,7 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
 
 
 def _normalised(a: Map) -> Map:
-    """Return a linear map, multiplied such that its first entry is 1. Products with the result need fewer
+    """Return a linear map divided by its first nonzero entry, which becomes 1. Products with the result need fewer
     multiplications.
     """
     first = a[min(a)]

@@ -107,13 +107,13 @@ class Realisation:
 
     @property
     def with_elements(self) -> Realisation:
-        """The same parts without functionals: all components of the group elements are unknowns."""
+        """These parts without functionals: all components of the group elements are unknowns."""
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
 
     @property
     def lifted(self) -> Realisation | None:
-        """The same parts with frames F for all group elements, see `phigen.gauss.lift`.
+        """These parts with frames F for all group elements; see `phigen.gauss.lift`.
 
         None if the system has no group elements, or if a group element has no frame.
         """

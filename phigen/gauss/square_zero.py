@@ -24,7 +24,8 @@ def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
     step.
 
     A = N ⊕ B with a subalgebra B, and 2 dim B ≤ dim A. N is the radical of the bilinear form tr ab. Returns () if there
-    is no such ideal, if N and B are not spanned by basis elements, or if a frame element of A is in neither.
+    is no ideal with these properties, or if N and B are not spanned by basis elements. The result is also () if one of
+    the elements in ``algebra.frame``, by which momenta are computed, is neither in N nor in B.
     """
     n, zero = range(algebra.dimension), algebra.field.zero
     products = {at: row for at, row in algebra.table.items() if row}

@@ -156,8 +156,8 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ of the momenta on a star algebra, and the frame elements f, after division by numbers: x̃/q and
-    f/c.
+    """The functional x̃ of the momenta on a star algebra, and the elements f in ``frame`` of the `StarAlgebra`, both
+    divided by numbers: x̃/q and f/c.
 
     The numbers are chosen such that products need few multiplications by constants. ``at_basis`` has the values of x̃/q
     at the basis elements of the algebra, and ``frame`` has the elements f/c. The momenta x̃(E_a) are linear
@@ -265,11 +265,11 @@ def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> l
 
 
 def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
-    """Return the momenta x̃(G f G*) of a group element G for the frame elements f of the star algebra, up to
-    factors.
+    """Return the momenta x̃(G f G*) of a group element G for the elements f in ``frame`` of the `StarAlgebra`, divided
+    by the numbers of `_Scaled`.
 
     For each basis element E_a of the Lie algebra, x̃(G E_a G*) is a linear combination of these momenta. The second
-    result has its coefficients.
+    result has the coefficients of these combinations.
     """
     algebra, g = group.algebra, _element_at(points, group, places)
     scaled = _scaled(group, group_values(points.system, group))
@@ -308,7 +308,7 @@ def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Express
 def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
-    """Return x̃(wfw*)/q for an element w and a frame element f of the star algebra.
+    """Return x̃(wfw*)/q for two elements w and f of the star algebra.
 
     ``left`` has the values x̃(wb)/q at the basis elements b, as `_functional_times` returns them.
     """
@@ -363,8 +363,8 @@ def vector_field(
 
     ``stage_values`` has the coordinates and the time at the stage by name. ``slopes`` replaces ∇H if it is not None.
     Group elements follow Ġ = Gξ with a velocity ξ in the Lie algebra; ``hold`` replaces each component of ξ by another
-    expression. If ``collected``, components of ξ that are affine in the momenta are written in a shorter form: as sums
-    over the values x̃(G f G*) at the frame elements f.
+    expression. If ``collected``, components of ξ that are affine in the momenta are written in a shorter form: as
+    linear combinations of the values x̃(G f G*), with the elements f in ``frame`` of the `StarAlgebra`.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -438,8 +438,9 @@ def _collected(
 ) -> list[Expression | None]:
     """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a of a group element, for w = ``weight``.
 
-    E_a is the basis of the Lie algebra. Components that are affine in the momenta are written as sums over x̃(G f G*)
-    for the frame elements f, which needs fewer multiplications. All others are None.
+    E_a is the basis of the Lie algebra. Components that are affine in the momenta are written as linear combinations of
+    the values x̃(G f G*), with the elements f in ``frame`` of the `StarAlgebra`. This form needs fewer multiplications.
+    All other components are None.
     """
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]

@@ -1,9 +1,10 @@
 """Statements about a Gauss step, decided for each system: symplecticity, order, brackets, momentum map.
 
-A Gauss method is symplectic and preserves quadratic first integrals if its coefficients, as the solver uses them,
-satisfy μ_ij + μ_ji = 1. Coordinates with the brackets of a Lie algebra are a momentum map J on the space of group
-elements. By the axioms of `phigen.gauss.star_algebra`, J is quadratic and a Poisson map, and it has the value x at the
-unit element. Hence the step in x is a Poisson map.
+A Gauss method has the coefficients μ_ij = a_ij/b_j (see `phigen.gauss.tableau`). It is symplectic and preserves
+quadratic first integrals if these coefficients, as the solver uses them, satisfy μ_ij + μ_ji = 1. Coordinates with the
+brackets of a Lie algebra are a momentum map J on the space of group elements. By the axioms of
+`phigen.gauss.star_algebra`, J is quadratic and a Poisson map, and it has the value x at the unit element. Hence the
+step in x is a Poisson map.
 """
 
 from __future__ import annotations
@@ -156,8 +157,8 @@ def _functionals(system: System, points: StageMap) -> Statement:
     """Decide whether a step is the same if functionals λ take the place of some components of group elements as
     unknowns.
 
-    The changes of coordinates and the velocities must be equal. Symbols stand for ∇H, so that the statement holds for
-    any H.
+    For both choices of unknowns, the changes of coordinates must be equal, and the velocities too. Symbols stand for
+    ∇H, so that the statement holds for any H.
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)

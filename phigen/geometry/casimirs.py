@@ -3,7 +3,8 @@
 Candidates come from these sources, in this order:
 
 - the Casimirs that define a Nambu bracket
-- the Casimirs of the blocks of a product, and those of a pull-back in the other coordinates
+- the Casimirs of the blocks of a product and, if the spec states π in other coordinates (a pull-back), the Casimirs in
+  those coordinates
 - linear functions, from the kernel of a constant π
 - monomials x^u, from the kernel of the matrix A of a log-canonical π
 - on the dual of a matrix algebra with a non-degenerate trace form: polynomials of degree up to 3, then traces tr X^m

@@ -2,9 +2,9 @@
 
 An error is relative to the value of the quantity at the start. If the terms of the quantity nearly cancel at the start,
 as for an energy near its arbitrary zero, the error is relative to the size of the terms instead. For a system, this
-size is Σ |x_i ∂_i H| at the start: the change of H by a relative change of all coordinates, which does not depend on
-constants in H. For a lattice it is the sum of the absolute energies of the sites. If this size is 0 too, the error is
-absolute.
+size is Σ |x_i ∂_i H| at the start: if each coordinate changes by a small fraction ε of its value, H changes by up to ε
+times this sum. Constants in H do not change the sum. For a lattice the size is the sum of the absolute energies of the
+sites. If this size is 0 too, the error is absolute.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient
 
-#: Ratio of a value to the size of its terms below which the value counts as 0.
+#: A value counts as 0 if it is below this fraction of the size of its terms.
 SMALL = 1e-3
 
 #: Relative energy error above which users are warned: a tenth of the energy is not a small perturbation.
@@ -119,8 +119,8 @@ def value_and_terms(
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """Return the largest value of |Q| and Σ |x_i ∂_i Q| along a trajectory. Rounding errors of Q are proportional to
-    it.
+    """Return one number: the largest value that |Q| or Σ |x_i ∂_i Q| has along a trajectory. Rounding errors of Q are
+    proportional to this number.
     """
     value, terms = value_and_terms(quantity, coordinates, values)
     return float(np.max(np.maximum(np.abs(value), terms))) or 1.0

@@ -72,7 +72,7 @@ def _parts(system: System) -> dict[str, Sequence[Expression]]:
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
-    """Return a text that names a divisor, or the argument of a logarithm, that is 0 everywhere; "" without one."""
+    """Return a text that names a divisor, or the argument of a logarithm, that is 0 everywhere; "" if there is none."""
     for e in topological(list(roots)):
         if e.op == "log" or (e.op == "pow" and e.value < 0):
             (argument,) = e.args

@@ -44,7 +44,8 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
                     for k, second_factor in rows[a].items() if slope != 0 else ():
-                        # Of the three cyclic orders of a triple, only the one with i < j < k is taken.
+                        # Only the cyclic permutations of an increasing triple are used. The other permutations give the
+                        # same sum with the opposite sign.
                         if k not in (i, j) and (i < j < k or j < k < i or k < i < j):
                             indices = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
                             sums[indices] = sums.get(indices, tower.zero) + tower.product(slope, second_factor)

@@ -25,8 +25,8 @@ class Source:
     amplitude: Expression
 
     def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-        """Return the covector σ∇g. A step adds the product of this covector and a noise increment ΔW to its
-        covector.
+        """Return the covector σ∇g. The product of this covector and the noise increment ΔW is added to the covector p
+        of a step.
         """
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 

@@ -18,10 +18,11 @@ _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIV
 
 
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
-    """Return the statement that all values of ``e`` are positive, except values that are 0.
+    """Return the statement that ``e`` is positive.
 
-    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the sign follows
-    from the form of ``e``, where the symbols ``positive`` count as positive. Otherwise it is checked at the starts.
+    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the form of
+    ``e`` shows that ``e`` is nowhere negative; the symbols ``positive`` count as positive. If the form does not exclude
+    that ``e`` is 0, the detail of the statement says so. In all other cases the statement is checked at the starts.
     """
     for point in starts:
         try:
@@ -82,7 +83,7 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
-        if e.op == "neg":  # the sign is known if the argument is a negative number, or a product of such a number
+        if e.op == "neg":  # the sign is known if the argument is a negative number, or a product with such a factor
             return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None

@@ -111,9 +111,7 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
-    """Return the inverse of an affine map y = ψ(x), x = J⁻¹(y − ψ(0)), where J is its constant Jacobian matrix; else
-    None.
-    """
+    """Return the inverse x = J⁻¹(y − ψ(0)) of the map y = ψ(x) if its Jacobian matrix J is constant, else None."""
     columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
     if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
         return None

@@ -41,7 +41,7 @@ _TO_SYMPY = {"abs": "Abs"}
 def expression(value: Any) -> Expression:
     """Return a sympy expression or a number as an `Expression`.
 
-    A Float becomes the decimal number as which sympy prints it. Raises `SpecError` for functions and constants that
+    A Float becomes the decimal number that sympy prints for it. Raises `SpecError` for functions and constants that
     phigen does not have, and for text, which sympy would evaluate as Python. Raises `LimitError` for numbers out of
     range.
     """

@@ -97,7 +97,7 @@ class System:
 
     @property
     def frozen(self) -> System:
-        """The same system with the time as a parameter, for statements at a fixed time."""
+        """This system with the time as a parameter, for statements at a fixed time."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
         return replace(self, parameters=(*self.parameters, *standing), time="")
 

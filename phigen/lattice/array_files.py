@@ -28,8 +28,8 @@ ENDS = ("a", "b")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The numbers of a ``.csv`` file as ``rows``. ``names`` are the column names in its first line; () without
-    names.
+    """The numbers of a ``.csv`` file as ``rows``. ``names`` are the column names in the first line of the file, or ()
+    if the file has none.
     """
 
     path: Path
@@ -46,8 +46,9 @@ class NumberTable:
 def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
     """Return the array in a ``.npy`` or ``.csv`` file.
 
-    A ``.csv`` table of one column may have a column name: ``name``, that of the field or parameter. Raises `ValueError`
-    if the array does not have the given ``shape``, and for other contents.
+    ``name`` is the name of the field or parameter. A ``.csv`` table of one column may have this name as its column
+    name. Raises `ValueError` if the array does not have the given ``shape``, or contains anything but finite real
+    numbers.
     """
     if path.suffix == ".npy":
         return _array(path, shape)

@@ -13,7 +13,8 @@ from phigen.lattice.cell import GRID, Cell
 from phigen.symbolic.expression import ONE, Expression, fold, gradient, mul, power, product, rebuild, symbol
 from phigen.symbolic.neighbours import ENDS
 
-#: Expression as a product of powers of certain symbols and one other factor: this factor, and the exponents by symbol.
+#: An expression f·Π s^k with powers of certain symbols s, as a pair: the factor f, and a map from each s to its
+#: exponent k.
 Factored = tuple[Expression, Mapping[str, int]]
 
 
@@ -49,7 +50,8 @@ class SumFactors:
 
     It is a product of powers of parameters that have a value at every site and may be 0. The sums over bonds and pairs
     are computed without the factor, and then multiplied by ``at_site``, the factor at the site of the sum. ``at_end``
-    maps the symbols of the parameters at the end of a bond, such as ``m[a]``, to their exponents in the factor.
+    has the same factor in another form: it maps the symbols of the parameters at end a of a bond or pair, such as
+    ``m[a]``, to their exponents. End a is at the site of the sum.
     """
 
     at_site: Expression = ONE
@@ -59,7 +61,7 @@ class SumFactors:
 def sum_factors(cell: Cell, name: str) -> SumFactors:
     """Return the factor that all summands of the force on the field ``name`` have in common.
 
-    The factor is 1 on a grid, with brackets along bonds, or if no parameter may be 0.
+    The factor is 1 if the lattice is a grid, if there are brackets along bonds, or if no parameter may be 0.
     """
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()

@@ -1,10 +1,10 @@
 """The description of one site of a lattice, its cell: fields, brackets with neighbours, and energy density.
 
 Values at neighbours are ordinary symbols of expressions. On a grid, ``x[i-1,j+2]`` is x at the site with the offset −1
-along the axis i and 2 along the axis j. Axes come in their order, and axes with the offset 0 are left out: ``x[i+1]``
-is x at the next site along i, and ``x`` is x at the site itself. On graphs, and if all pairs of sites interact,
-``x[a]`` and ``x[b]`` are x at the two ends of a bond or pair. Parameters that have a value at every site are written in
-the same way.
+along the axis i and 2 along the axis j. Axes are written in the order of ``axes`` of `Cell`; axes with the offset 0 are
+left out: ``x[i+1]`` is x at the next site along i, and ``x`` is x at the site itself. On graphs, and if all pairs of
+sites interact, ``x[a]`` and ``x[b]`` are x at the two ends of a bond or pair. Parameters that have a value at every
+site are written in the same way.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class Cell:
     of all three over all sites, bonds and pairs. Terms that reach beyond an open end are left out (see `terms`).
 
     ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
-    ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
-    ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site. ``observables`` are
-    fields or densities; ``reductions`` says how a density becomes one number, such as a sum over the sites. ``derived``
-    are values at sites that a solver computes from the parameters.
+    ``invariants`` are sums over sites. ``time`` is the symbol of t in H and in the invariants; it is "" if nothing
+    depends on t. ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site.
+    ``observables`` are fields or densities; ``reductions`` says how a density becomes one number, such as a sum over
+    the sites. ``derived`` are values at sites that a solver computes from the parameters.
     """
 
     name: str

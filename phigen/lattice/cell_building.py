@@ -133,8 +133,8 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
     """Return one line for the header of generated files. It names all sizes that do not fit the colours of
     sites.
 
-    The line says that a splitting with this number of ``colours`` needs other sizes, and gives examples. If there are
-    no ``wrong_sizes``, the result is "".
+    ``colours`` is the number of colours of the splitting. The line says that this splitting is not possible with these
+    sizes, and names sizes with which it is possible. If there are no ``wrong_sizes``, the result is "".
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"

@@ -1,8 +1,8 @@
-"""Search for the potential V of a Nyström method among two parts V and T of H on a lattice.
+"""Search for a part of H that can be the potential V of a Nyström method on a lattice, where H = T + V.
 
 On grids, the flow of the modified potential V + κ{V, {V, T}} is computed too; see `phigen.splitting.kicks`. The bracket
-of two sums over sites is again a sum over sites s. A pair of fields f and g with brackets at the distance d contributes
-the term ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d) to {F, G}.
+{F, G} of two sums F and G over sites is again a sum over sites s. A field f at the site s and a field g at the site s +
+d contribute the term ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d) if their bracket {f, g}(s) is not 0.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from phigen.symbolic.tower import Tower
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
     """Return the parts V of H = T + V that can be the potential of a Nyström method.
 
-    The method requires {V, {V, {V, T}}} = 0, which is proved by polynomial degrees. Splittings into another number of
-    parts, or with colours, have no such part. On a grid, each result also has the flow of the modified potential V +
-    κ{V, {V, T}}.
+    The method requires {V, {V, {V, T}}} = 0, which is proved by polynomial degrees. There is no result if the splitting
+    does not have exactly two parts, or if it has colours. On a grid, each result also has the flow of the modified
+    potential V + κ{V, {V, T}}.
     """
     coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
     if len(splitting.flows) != 2 or coloured or cell.bond_bracket:

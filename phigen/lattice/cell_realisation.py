@@ -42,11 +42,13 @@ KIND = "constant in logarithms"
 
 @dataclass(frozen=True)
 class CellRealisation:
-    """Symmetric and exact bi-realisation (α, β) of the brackets of a lattice, at one site.
+    """Bi-realisation (α, β) of the brackets of a lattice, at one site. It is symmetric, and in closed form, not a
+    truncated series.
 
-    ``displacement`` is α − x and ``increment`` is β − α, by field. They are expressions in the fields around the site,
-    and in the symbols `momentum` of covectors. If brackets are between fields of one site only, ``site`` has the system
-    of one site and its bi-realisation. Otherwise ``logarithmic`` has the fields f that enter as log f.
+    ``displacement`` is α − x and ``increment`` is β − α, by field. These expressions contain the fields at the site and
+    around it, and symbols of the kind `momentum` for the components of the covector. If brackets are between fields of
+    one site only, ``site`` has the system of one site and its bi-realisation. Otherwise ``logarithmic`` has the fields
+    f that enter as log f.
     """
 
     kind: str
@@ -58,8 +60,8 @@ class CellRealisation:
 
     @cached_property
     def middle(self) -> dict[str, Expression]:
-        """The formula for y at a site, by field, where y solves α(y, p) = x. The symbols `initial` stand for x at the
-        site.
+        """The formula for y at a site, by field, where y solves α(y, p) = x. Symbols of the kind `initial` stand for x
+        at the site.
 
         The formula is explicit if α is affine in y. Otherwise the formula contains y itself.
         """

@@ -1,8 +1,8 @@
 """Flows of forces and of noise at sites, as parts of the splitting of a lattice.
 
-Forces have the flow of πζ + f, with the covector force ζ and the vector force f. If this flow is not elementary, its
-summands have flows of their own. Each source of noise has the flow of the Hamiltonian Σ ΔW_s σ g(s), where the sum runs
-over all sites s, and ΔW_s is the noise increment at s.
+Forces have the flow of πζ + f, with the covector force ζ and the vector force f. If this flow is not elementary,
+summands of πζ + f have separate flows. Each source of noise has the flow of the Hamiltonian Σ ΔW_s σ g(s), a sum over
+all sites s. Here g is the Hamiltonian of the source, σ its amplitude, and ΔW_s its noise increment at s.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ Rates = Mapping[str, Expression]
 
 
 def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of the forces πζ + f, with the covector force ζ and the vector force f; () without forces.
+    """Return the flows of the forces πζ + f, with the covector force ζ and the vector force f; () if there are no
+    forces.
 
     Raises `SpecError` if a summand of πζ + f has no flow in closed form; the error names the summand.
     """

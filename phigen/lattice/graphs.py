@@ -180,10 +180,10 @@ class _SiteEquation:
         return sums
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
-        """Return the sums over bonds that brackets along bonds cause in the equation of motion, and add their terms to
-        ``rates``.
+        """Return the sums over bonds in the equation of motion that stem from brackets along bonds, and add terms with
+        these sums to ``rates``.
 
-        Each term is the product of a monomial in the fields of this site and a sum over the neighbours.
+        Each term is the product of a monomial in the fields of the site and a sum over the neighbours of the site.
         """
         selection = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}

@@ -45,7 +45,7 @@ def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
 
 
 def _distances(bonds: NDArray[np.int64], sites: int) -> Floats:
-    """Return the least number of bonds on a path between each two sites, as a matrix (sites, sites).
+    """Return the least number of bonds on a path between any two sites, as a matrix (sites, sites).
 
     Sites that no path connects get a distance larger than all others.
     """

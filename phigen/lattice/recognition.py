@@ -288,7 +288,7 @@ def _density(e: Expression, names: _SiteNames) -> list[Expression]:
 def _terms(e: Expression, names: _SiteNames, factor: Expression) -> Iterator[Expression]:
     """Yield the additive terms of an expression, each multiplied by ``factor``.
 
-    If a sum in brackets has a factor that does not depend on the site, each term of the sum is multiplied by this
+    If a sum in parentheses has a factor that does not depend on the site, each term of the sum is multiplied by this
     factor.
     """
     args = e.args

@@ -74,8 +74,8 @@ def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiReali
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """Return an expression of the cell at a site of the ``box``. Its symbols become those of fields and covectors of
-    the box.
+    """Return an expression of the cell at a site of the ``box``. Symbols in the expression become symbols of fields and
+    covectors of the box.
     """
     values: dict[str, Expression] = {}
     for name in symbols_of(e):

@@ -125,10 +125,10 @@ class BondSum:
     """Sums over the bonds or pairs of a site.
 
     ``values`` maps the symbol of each sum to its summand. In the summand, x[a] is x at the site itself, and x[b] is x
-    at the opposite end of the bond or pair. If ``end`` is "a", the sums are over the bonds that list the site first; if
-    it is "b", over those that list it second; if it is "", over all. In a part of one colour, ``chosen`` says which end
-    of a bond has the colour: the site itself ("here") or the opposite end ("there"). The symbols in ``extremes`` stand
-    for a maximum (``max``) or minimum (``min``) in place of a sum.
+    at the opposite end of the bond or pair. ``end`` says over which bonds the sums run: "a", those that list the site
+    first; "b", those that list the site second; "", all bonds of the site. In a part of one colour, ``chosen`` says
+    which end of a bond has the colour: the site itself ("here") or the opposite end ("there"). The symbols in
+    ``extremes`` stand for a maximum (``max``) or minimum (``min``) in place of a sum.
     """
 
     values: Mapping[str, Expression]
@@ -233,8 +233,8 @@ def splittings(
 ) -> Iterator[CellSplitting]:
     """Yield ways to write H as a sum of parts with elementary flows, one for each colouring.
 
-    The ways are ordered by the number of colours, then by the number of parts. Raises `SpecError` at ``place`` if H is
-    no such sum; the error names the term that has no flow.
+    The ways are ordered by the number of colours, then by the number of parts. Raises `SpecError` at ``place`` if a
+    term of H has no elementary flow; the error names this term.
     """
     search = search or PartSearch
     refused: NoPartError | None = None
@@ -280,8 +280,8 @@ def summands_of(cell: Cell) -> list[Summand]:
 
 @dataclass
 class PartSearch:
-    """Search for the parts of H with one colouring. A term in a part is a pair: the summand of H, and the colour where
-    it begins.
+    """Search for the parts of H with one colouring. A term in a part is a pair: a summand of H, and the colour of the
+    sites at which the summand begins.
     """
 
     cell: Cell
@@ -342,7 +342,9 @@ class PartSearch:
         return classes if all(self._commute(c, c) for c in classes) else []
 
     def _is_single_site(self, term: Summand) -> bool:
-        """Whether the term is a function of the fields of one site, and π is local."""
+        """Whether the term is a function of the fields of one site, and all brackets are between fields of one and the
+        same site.
+        """
         places = self.cell.places(term.expression).values()
         return self.cell.is_local and not term.bond and all(o == self.cell.origin for _, o in places)
 
@@ -585,7 +587,8 @@ class SiteFields:
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Return the derivative of the noise Hamiltonian Σ ΔW σ g by ``field``, at the site that is ``shift`` away.
+        """Return the derivative of the noise Hamiltonian Σ ΔW σ g with respect to ``field``, at the site that is
+        ``shift`` away.
 
         The sum is over the sources of noise, with their increments ΔW, amplitudes σ and Hamiltonians g.
         """

@@ -139,8 +139,8 @@ class _Reader:
     def _sites(self, bonds: Bonds) -> int:
         """Return the number of sites of a run that does not state ``sizes``.
 
-        It is the length of the longest list in the initial state. If bonds end at sites with larger numbers, it is the
-        largest of their numbers plus 1, since sites are counted from 0.
+        This number is the greater of two numbers: the length of the longest list in the initial state, and 1 plus the
+        largest number of a site at the end of a bond. Sites are counted from 0.
         """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):

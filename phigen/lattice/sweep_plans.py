@@ -142,8 +142,8 @@ class SplittingPlan:
         return ""
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
-        """Yield all flows, each with a text that says what moves: a source of noise, a force, or a part of H. Noise
-        comes first.
+        """Yield all flows, each with a text that names the cause of the motion: a source of noise, a force, or a part
+        of H. Noise comes first.
         """
         for flow, name in zip(self.noise, cell.noise, strict=True):
             yield flow, f"the noise {name}"
@@ -314,8 +314,8 @@ def _seamed(
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
     """Return the parts V of H = T + V that can be the potential of a Nyström method.
 
-    If H depends on the time, T + e takes the place of T, where e is the momentum of the time. Then a part V is left out
-    if T depends on the time.
+    If H depends on the time t, T + e takes the place of T, where e is the momentum conjugate to t. Then a part V is
+    left out if T depends on the time.
     """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 

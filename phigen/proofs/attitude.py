@@ -398,7 +398,8 @@ def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vect
 
 
 def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:
-    """Return the expressions with each φ(s) replaced by ``value``, and its derivative φ′ by its differential equation.
+    """Return the expressions with each φ(s) replaced by ``value(s)``. Each φ′(s) is expressed by s and φ(s), by the
+    differential equation of φ.
 
     The proofs use no other property of the function φ.
     """

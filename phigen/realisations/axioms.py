@@ -35,9 +35,9 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
     """Return the statements on α and β at p = 0, on their brackets, and on the simplified forms that the solver
     uses.
 
-    A pull-back is made of a bi-realisation in other coordinates. For a pull-back, the brackets are proved in these
-    coordinates. For truncated bi-realisations, and if steps follow paths, α and β are truncated series in p. Then the
-    brackets are proved up to one degree in p less than the series have.
+    If the spec states π in other coordinates y (a pull-back), the brackets are proved in y. α and β may be truncated
+    series in p: for truncated bi-realisations, and if steps follow paths. If these series are correct up to degree d in
+    p, the brackets are proved up to degree d − 1.
     """
     if realisation.inner is not None and is_composed(system, realisation):
         return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]
@@ -50,8 +50,8 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """Return the statements on the brackets for a pull-back, in the coordinates of the bi-realisation of which it is
-    made. Their details name the coordinates.
+    """Return the statements on the brackets for a pull-back, in the coordinates y in which the spec states π. The
+    details of the statements name these coordinates.
     """
     place = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]

@@ -1,7 +1,7 @@
 """The kinds of bi-realisations, by name.
 
-Each kind has a module, which is imported and listed here. In this module, the constant KIND is the name of the kind,
-and the function ``build`` makes the bi-realisation.
+Each kind has a module, which is imported and listed here. The module of a kind contains the name of the kind, as the
+constant KIND, and the function ``build``, which makes the bi-realisation.
 """
 
 from __future__ import annotations

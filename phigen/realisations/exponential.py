@@ -7,7 +7,7 @@ With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
 No matrix representation is needed. For linear π this is Karasev's construction. Steps are exact if H is linear, since
 the generating function for the time t is then tH. On so(3), so(4) and se(3) the error constants of the exponential are
 8 to 700 times smaller than those of the Cayley transform. An affine π comes from a Lie algebra with a cocycle; the
-coordinates are then the hyperplane z = 1 in the dual of the central extension. b(M_p)x is written in closed form if
+phase space is then the hyperplane z = 1 in the dual of the central extension. b(M_p)x is written in closed form if
 `phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ = π(m)p numerically.
 """
 

@@ -17,7 +17,8 @@ class Dual:
     """The coordinates x as a point of the dual of a Lie ``algebra``, and the covector p as an element of the algebra.
 
     For an affine π the algebra is the central extension, and the last components are x_z = 1 and p_z = 0. x_z is a
-    Casimir, so the hyperplane x_z = 1 is a Poisson submanifold. Maps that do not depend on p_z restrict to it.
+    Casimir, so the hyperplane x_z = 1 is a Poisson submanifold. Maps that do not depend on p_z can be restricted to
+    this hyperplane.
     """
 
     algebra: LieAlgebra

@@ -66,7 +66,8 @@ def series(system: System, degree: int) -> list[Expression]:
         powers.append(_derivatives_along_flow(powers[-1], coordinates, flow))
     approximations = [x]  # approximations[d]: α, correct up to degree d in p
     for order in range(1, degree + 1):
-        # D^j x has degree j in p. So it suffices to substitute an α that is correct up to degree order − j.
+        # Here α is computed up to degree ``order`` in p. D^j x has degree j in p, so it suffices to substitute an α
+        # that is correct up to degree order − j.
         shifts = [
             substitute(powers[j - 1], dict(zip(coordinates, approximations[order - j], strict=True)))
             for j in range(1, order + 1)

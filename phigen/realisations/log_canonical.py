@@ -34,7 +34,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         half * total(row[j] * w for row, w in zip(a, products, strict=True) if not row[j].is_zero)
         for j in range(len(x))
     ]
-    # In t = exp(u/2) − 1 all formulas of the solver are rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
+    # All formulas of the solver are rational functions of t = exp(u/2) − 1. For example, 2 sinh(u/2) = t (1 + 1/(1 +
+    # t)).
     growth = [call("expm1", u) for u in exponents]
     alpha = tuple(xj * call("exp", u) for xj, u in zip(x, exponents, strict=True))
     beta = tuple(xj * call("exp", -u) for xj, u in zip(x, exponents, strict=True))

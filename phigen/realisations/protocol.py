@@ -22,8 +22,9 @@ PAPER = (
 class BiRealisation:
     """Two maps α, β : (x, p) → x that satisfy the axioms in `phigen.realisations.axioms`.
 
-    All tuples have one expression for each coordinate, in the symbols NAME (x), ``momentum(NAME)`` (its covector) and
-    the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
+    All tuples have one expression for each coordinate, in the symbols NAME of the coordinates, the symbols
+    ``momentum(NAME)`` of the components of the covector p, and the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} =
+    π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
 
     - ``displacement``: α − x, in a form in which no terms of the size of x cancel
     - ``increment``: β − α, in a form with the same property
@@ -33,8 +34,8 @@ class BiRealisation:
       to one degree less
     - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction). Then ``alpha`` and ``beta`` are
       truncated series; the S_i are computed from these, but no step evaluates them
-    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation; the axioms are proved
-      there
+    - ``inner``: for a pull-back, the system in the coordinates y in which the spec states π, and the bi-realisation of
+      this system; the axioms are proved in y
     - ``explanation``: the chosen form and the reason, for the user; ``reference``: the source of the formulas
     """
 

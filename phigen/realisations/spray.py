@@ -12,9 +12,9 @@ article says this of ψ, but ψ changes x by −½πp.
 
 If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. If moreover the flow has a closed form, α and β have one too. Examples are the
 constant and the log-canonical bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat
-spray (f = 0), Ω₀ = Σ d(mean_i of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p. This is Karasev's
-construction, with the same S_i. Any other spray changes S_3 by a function G(x, ∇H) with G(x, p) cubic in p. The reason
-is that two symmetric bi-realisations differ by a symplectic map that is the identity to first order at p = 0.
+spray (f = 0), Ω₀ = Σ d(mean_i of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p. This spray has the S_i
+of Karasev's construction. Any other spray changes S_3 by a function G(x, ∇H) with G(x, p) cubic in p. The reason is
+that two symmetric bi-realisations differ by a symplectic map that is the identity to first order at p = 0.
 
 Sprays and symplectic realisations: M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011).
 """
@@ -53,7 +53,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     The bi-realisation is exact if phigen finds a closed form; otherwise it is a truncated series. ``choice.spray`` is
     ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves each x_j p_j),
     ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j. ``choice.degree`` is the degree in p of
-    a truncated series. By default it is k + 1, where k is the order of the method, rounded up to an even number. Then a
+    a truncated series. Let k be the order of the method, rounded up to an even number. The default is k + 1. Then a
     step is a Poisson map up to O(h^(k+2)).
 
     Raises `SpecError` unless each f_j is a quadratic form in p, and for a degree that is too small for the order.

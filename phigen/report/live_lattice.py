@@ -77,8 +77,9 @@ def gathered_lattice(
 
 
 def _with_invariants(compilation: CompiledLattice) -> Spec | None:
-    """Return a spec whose observables include the invariants and the magnitudes of their terms; None without
-    invariants."""
+    """Return a spec whose observables include the invariants and the magnitudes of their terms; None if there are no
+    invariants.
+    """
     spec, cell = compilation.spec, compilation.cell
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}

@@ -50,7 +50,7 @@ class Beginning:
 
 
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
-    """Return the energy level e that the argument ``gauge`` sets, and remove this argument.
+    """Return the energy level e that the argument ``gauge`` sets, and remove ``gauge`` from ``by_keyword``.
 
     Only lattices with a monitor have this argument. If the argument is missing, returns None; e is then −H of the
     initial state. Raises `ValueError` unless the value is one finite number.

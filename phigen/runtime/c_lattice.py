@@ -363,7 +363,7 @@ class CLatticeSession:
 
 
 class CLattice:
-    """Solver of a lattice over the shared library of generated C files (name → text).
+    """Solver of a lattice that calls the shared library of generated C files (name → text).
 
     The object is a `phigen.runtime.lattice.LatticeBackend`.
     """

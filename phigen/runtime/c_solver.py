@@ -37,7 +37,8 @@ from phigen.runtime.members import Members, one_by_one, shared_out
 
 
 class CSolver:
-    """Solver over the shared library of generated C files (name → text): a `phigen.runtime.backend.Backend`.
+    """Solver that calls the shared library of generated C files (name → text); it is a
+    `phigen.runtime.backend.Backend`.
 
     The object has no state of a trajectory, so several threads may use it. The library is taken from the cache or, if
     it is not there, compiled. Raises `ToolchainError` if the library cannot be compiled or loaded.

@@ -30,8 +30,8 @@ def without_pullback(interface: Interface) -> TypeError:
 
 
 class Pullback(NamedTuple):
-    """Result of `Solver.pullback`: states, and derivatives by the initial state and by the parameters (by
-    name).
+    """Result of `Solver.pullback`: states, and derivatives with respect to the initial state and to each parameter, by
+    name.
 
     The function whose derivatives are computed is the scalar product of the states with a cotangent.
     """
@@ -42,8 +42,9 @@ class Pullback(NamedTuple):
 
 
 class Jacobian(NamedTuple):
-    """Result of `Solver.jacobian`: the last state, its derivative by the initial state, and derivatives by
-    parameters."""
+    """Result of `Solver.jacobian`: the last state, and its derivatives with respect to the initial state and to each
+    parameter.
+    """
 
     x1: Floats
     by_x0: Floats
@@ -54,8 +55,9 @@ class Jacobian(NamedTuple):
 class Segment:
     """Part of a run that is differentiated at once: ``count`` steps, which begin after step number ``first``.
 
-    ``rows`` are the numbers of the rows of the trajectory in this part. Rows are after every ``stride`` steps and at
-    the end of the part. A part that ends between two rows of the trajectory has no rows.
+    ``rows`` are the numbers of the rows of the trajectory in this part. There is a row after every ``stride`` steps of
+    the part, and one after its last step. If the steps between two rows are divided into several parts, only the last
+    of these parts has a row.
     """
 
     first: int

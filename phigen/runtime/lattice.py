@@ -894,12 +894,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product by ``x0``, and its
-        derivatives by the parameters, by name and in the shapes of the parameters. ``x0`` is (coordinates, *sizes), or
-        has a first axis of members; x1 and the cotangent have the shape of x0. Parameters, ``h`` and ``t0`` may have an
-        axis of members too. The derivative by an argument that all members share is the sum over members. With a
-        ``stride``, x1 and the cotangent have a further first axis of rows, for all frames of `integrate`. Derivatives
-        are exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product with respect to
+        ``x0``, and the derivatives with respect to the parameters, by name and in the shapes of the parameters. ``x0``
+        is (coordinates, *sizes), or has a first axis of members; x1 and the cotangent have the shape of x0. Parameters,
+        ``h`` and ``t0`` may have an axis of members too. The derivative with respect to an argument that all members
+        share is the sum over members. With a ``stride``, x1 and the cotangent have a further first axis of rows, for
+        all frames of `integrate`. Derivatives are exact to round-off. Raises `StepError`, and `TypeError` if the solver
+        was compiled without ``adjoint=True``.
         """
         times = self._times(t0, by_keyword)
         values = arguments.together(parameters, by_keyword)

@@ -84,8 +84,8 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
 
 
 def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
-    """Return rows at the times ``spans`` after the start and at the end, if a monitor rescales the time by dt =
-    g dτ.
+    """Return the rows of a run with a monitor (rescaled time: dt = g dτ). They are at the start, at the times ``spans``
+    after it, and at the end.
     """
     inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
     step_numbers = np.zeros(len(inner) + 2, dtype=np.int64)

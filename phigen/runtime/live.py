@@ -138,7 +138,7 @@ class LiveSession:
 
     @property
     def attitude(self) -> Floats | None:
-        """The attitude, a quaternion (4,) or a matrix (n, n); None without ``reconstruct``."""
+        """The attitude, a quaternion (4,) or a matrix (n, n); None if the solver has no ``reconstruct``."""
         return None if (rows := self._element()[0]) is None else rows[0]
 
     @property

@@ -167,7 +167,7 @@ def _session_at_time(
     """Return a session at the time ``span`` after the start, and its number of steps. Inside a step, the number has a
     fraction.
 
-    ``advance`` makes the whole steps before that time, with the argument ``session``.
+    ``advance(n)`` makes n whole steps with ``session``; it is called for the whole steps before that time.
     """
     clock = session.time()
     elapsed = session.steps * h if np.isnan(clock) else clock

@@ -26,8 +26,9 @@ PART_GRANULARITY = 32
 #: the start of a thread.
 _STEPS_PER_THREAD = 20_000
 
-#: Number of members in one call of C. If the steps are few, a call has more members, up to the number of steps summed
-#: over members. Python handles Ctrl-C only between calls.
+#: One call of C integrates up to _MEMBERS_PER_CALL members. If each member makes few steps, a call may integrate a
+#: multiple of this number, with at most _STEPS_PER_CALL steps of all its members together. Python handles Ctrl-C only
+#: between calls.
 _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 

@@ -117,7 +117,7 @@ class NumpyLatticeSession:
         if h != self._h:
             try:
                 self._h, self._rows = h, self._module._coefficients(self._sites, h)
-            except ValueError:  # raised if a coefficient is not finite; the C reports a status
+            except ValueError:  # raised if a coefficient is not finite; the C returns a status instead
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 

@@ -72,7 +72,7 @@ def origin_of(spec: Spec, run: Run | SweepSettings | None, command: str = "run")
 
 
 def companion(path: Path) -> Path:
-    """Return the path of the JSON file beside a ``.csv`` that has its metadata."""
+    """Return the path of the JSON file with the metadata of a ``.csv`` file, in the same folder."""
     return path.with_name(f"{path.name}-metadata.json")
 
 

@@ -131,10 +131,10 @@ class Propagation:
         return pulled_back.x0_bar.reshape(start), of_parameters
 
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
-        """Return the derivatives of the result of `run` by x0 and, by name, by each parameter.
+        """Return the derivatives of the result of `run` with respect to x0 and, by name, to each parameter.
 
-        The derivative by x0 has the shape of the result and a last axis (DIM,), the derivative by a parameter the shape
-        of the result. Each component of a member's result takes one reverse pass. Solvers of lattices have no Jacobian.
+        The first has the shape of the result and a last axis (DIM,), the others have the shape of the result. Each
+        component of a member's result takes one reverse pass. Solvers of lattices have no Jacobian.
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))

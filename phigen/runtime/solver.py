@@ -311,7 +311,8 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> tuple[Floats, Floats]:
-        """Return the state (DIM,) after one step from ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
+        """Return the state (DIM,) after one step from ``x`` (DIM,), and its derivative (DIM, DIM) with respect to
+        ``x``.
 
         Row i of the derivative is the gradient of the new coordinate i. The derivative is exact to round-off. The gauge
         (the multiples of Casimirs that the solver subtracts from H) is held fixed. Raises `StepError`, and `TypeError`
@@ -477,17 +478,17 @@ class Solver(Named[Backend, Interface]):
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product by ``x0``, and its
-        derivatives by the parameters, by name. ``x0`` is (DIM,) or (members, DIM); x1 and the cotangent have the shape
-        of x0. One state (DIM,) with arrays of parameters is the initial state of all members; x0_bar then has a row for
-        each member. With a ``stride``, x1 and the cotangent are (rows, …), for all rows of `integrate`. Parameters, h
-        and t0 are numbers or (members,); the derivative by a number that all members share is the sum over members.
-        ``threads`` is explained at `ensemble`.
+        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product with respect to
+        ``x0``, and the derivatives with respect to the parameters, by name. ``x0`` is (DIM,) or (members, DIM); x1 and
+        the cotangent have the shape of x0. One state (DIM,) with arrays of parameters is the initial state of all
+        members; x0_bar then has a row for each member. With a ``stride``, x1 and the cotangent are (rows, …), for all
+        rows of `integrate`. Parameters, h and t0 are numbers or (members,); the derivative with respect to a number
+        that all members share is the sum over members. ``threads`` is explained at `ensemble`.
 
         Derivatives are exact to round-off. The gauge (the multiples of Casimirs that are subtracted from H) is held
-        fixed. With a monitor (rescaled time: dt = g dτ), the energy level e = −H(x0) is differentiated by x0. There are
-        no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without
-        ``adjoint=True``.
+        fixed. With a monitor (rescaled time: dt = g dτ), the energy level e = −H(x0) is differentiated with respect to
+        x0. There are no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver was
+        compiled without ``adjoint=True``.
         """
         values = arguments.together(parameters, by_keyword)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
@@ -503,10 +504,12 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Jacobian:
-        """Return the state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives by x0 and parameters.
+        """Return the state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives with respect to x0 and
+        to each parameter.
 
-        The derivative by x0 is (DIM, DIM), with row i for coordinate i; derivatives by parameters are (DIM,), by name.
-        One `pullback` is made for each coordinate, with the same conventions and errors.
+        The derivative with respect to x0 is (DIM, DIM), with row i for coordinate i. The derivatives with respect to
+        parameters are (DIM,), by name. One `pullback` is made for each coordinate, with the same conventions and
+        errors.
         """
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         for name, value in arguments.together(parameters, by_keyword).items():

@@ -97,7 +97,7 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """Settings of the ``spectrum`` and of the ``correlation`` that a run requests; None without such a request."""
+    """Settings of a run for ``spectrum`` and ``correlation``, each None if the run does not request it."""
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None

@@ -217,7 +217,7 @@ def _lifted_step(step: Gauss, lifted: tuple[Kernel, Kernel, Lift], coefficients:
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """Return the record of a monitored solver; None without a monitor.
+    """Return the record of a monitored solver; None if there is no monitor.
 
     The record has the kernel of dt/dτ, and that of the physical time t of a step.
     """

@@ -145,7 +145,7 @@ class _Staged:
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The transpose of the path that a step follows; None without a path, or if gradients were not requested."""
+        """The transpose of the path that a step follows; None if there is no path, or if no gradients are requested."""
         return self.adjoint.path if self.adjoint else None
 
     @property

@@ -116,7 +116,8 @@ def _coefficient(
         lambda k, j: momentum.combined(source[k], j) if k < len(x) else unit_shift.get(j, functions.ring.zero),
     )
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
-    # In a symmetric bi-realisation S_i = 0 for even i. Only relations between functions show that the sum is 0.
+    # If the bi-realisation is symmetric, this coefficient is 0 for even i, but its terms may cancel only by relations
+    # between functions, such as sin² + cos² = 1.
     zero = functions.seems_zero(coefficient) and functions.vanishes(coefficient)
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 

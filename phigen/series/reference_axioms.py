@@ -61,9 +61,9 @@ class _Parts:
         self._known: dict[tuple[int, int, int | None], Any] = {}
 
     def deviation(self, first: int) -> Series:
-        """Return α − x for ``first`` = 0, or β − x for ``first`` = n, as power series in the degree in p.
+        """Return α − x for ``first`` = 0, or β − x for ``first`` = n, as power series in t along p ↦ tp.
 
-        The coefficient number k of the series is the part of degree k.
+        The coefficient of t^k is the part of degree k in p.
         """
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
@@ -80,7 +80,7 @@ class _Parts:
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
         """Return the part of degree ``degree`` in p of component ``f`` of (α, β).
 
-        With ``c``, return the part of this degree of the derivative of the component by x_c.
+        With ``c``, return the part of this degree of the derivative of the component with respect to x_c.
         """
         key = (f, degree, c)
         if key not in self._known:
@@ -95,5 +95,7 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Return the derivative by p_c of the part of degree ``degree`` in p of component ``f`` of (α, β)."""
+        """Return the derivative with respect to p_c of a part of component ``f`` of (α, β): the part of degree
+        ``degree`` in p.
+        """
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

@@ -165,15 +165,16 @@ def _commuting_terms(
 
 
 def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
-    """Return the composition of ``flow`` and of the flow of the sum of ``terms``; all ``terms`` commute with its
-    Hamiltonian.
+    """Return the composition of ``flow`` and the flow of the sum of ``terms``. All ``terms`` commute with the
+    Hamiltonian of ``flow``.
     """
     return composed(ring.coordinates, [flow, _flow(ring, terms)]) if terms else flow
 
 
 def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
-    """Return the flow of a sum of terms. Raises `_NoBodiesError` if they do not commute with each other, or have no
-    flow."""
+    """Return the flow of a sum of terms. Raises `_NoBodiesError` if the terms do not commute with each other, or if a
+    term has no flow.
+    """
     conflicts = Conflicts(ring).grouped(terms)
     if len(conflicts) > 1:
         first, second = (shortened(group[0].expression) for group in conflicts[:2])

@@ -120,8 +120,8 @@ class Addition:
         gaps_below, gaps_above = [e - low for e in self.levels], [high - e for e in self.levels]
         square, z = s**2, self.p * self.kappa**2
         roots = [sqrt(c**2 + e * square) for e in gaps_below]
-        # On the separatrix, that is for R = 0, C is positive and equal to one of the roots. Rounding may make C
-        # negative, so the root is used.
+        # ``roots`` has √σ_i² for each axis i. For the axis with the lowest E_i this is |C|, but σ_i = C may be
+        # negative. On the separatrix (R = 0) C is never negative, except by rounding, so there the root is used.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
         versine = 8 * z * power(1 + z, -2)  # 1 − C without cancellation
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
@@ -138,8 +138,8 @@ class Addition:
         """Return one value for each axis: from ``chosen`` for the axis with the lowest E_i, from ``others`` for the
         other two axes.
 
-        The axis is selected by the same conditions everywhere. This is necessary because on the separatrix two E_i are
-        equal but have different derivatives.
+        All formulas select this axis by ``conditions``. On the separatrix two E_i are equal but have different
+        derivatives; there, different conditions might select different axes.
         """
         second, third, _ = self.conditions
         first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
@@ -160,7 +160,7 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
     """Return three expressions whose signs give the order of the E_i; ``levels`` has E_1, E_2, E_3.
 
     The first is positive if E_2 > E_1. The second is positive if E_3 is greater than the smaller of E_1 and E_2. The
-    third is positive if the greater of E_1 and E_2 is greater than both other values.
+    third is positive if E_1 or E_2 is greater than both other values.
     """
     second = levels[1] - levels[0]
     lower, upper = call("choose", second, *levels[:2]), call("choose", second, levels[1], levels[0])

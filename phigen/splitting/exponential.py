@@ -143,7 +143,7 @@ def _without_quotients(
     """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −cA^a, without dividing by c.
 
     The increments are computed by entire functions of s = ct². sin and 1 − cos of the angle √s are computed from
-    functions of half the angle. Returns None if there is no such form.
+    functions of half the angle.
     """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:

@@ -104,11 +104,12 @@ class NoFlowError(Exception):
 
 
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
-    """Return the flow of a sum of commuting terms, by the simplest method that gives all flows.
+    """Return the flow of a sum of commuting terms. If phigen does not know the flow of the whole sum, the result is
+    composed of flows of single terms or of smaller sums.
 
-    Closed forms are tried first. If ``numeric``, two methods follow: matrix exponentials that are computed before the
-    steps, then exponentials of small matrices that depend on the state. Raises `NoFlowError` for the first term without
-    a flow.
+    Closed forms are tried first. If ``numeric``, two other methods are tried next: matrix exponentials that are
+    computed before the steps, then exponentials of small matrices that depend on the state. Raises `NoFlowError` for
+    the first term without a flow.
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:
@@ -303,8 +304,9 @@ def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     """Return the increments if all rates have a common factor that is constant along the flow, else None.
 
-    The equations without this factor must have a solution. Functions of a first integral have such a factor. For
-    instance, (q² + p²)² rotates q and p, as q² + p² does, but with a speed proportional to q² + p².
+    The equations without this factor must have a solution in closed form. There is a factor of this kind if the
+    Hamiltonian is a function of a first integral. For instance, the flow of (q² + p²)² rotates (q, p), like the flow of
+    q² + p², but with a speed proportional to q² + p².
     """
     moving = [f for f in field if f != 0]
     factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)

@@ -1,10 +1,10 @@
-"""The flows of forces, which are parts of a splitting in addition to those of H: the flow of ẋ = πζ + f, or of summands
-of this field.
+"""The flows of forces, which are parts of a splitting in addition to the parts of H.
 
-The whole field is one part if phigen knows its flow, in closed form or by a matrix exponential. Otherwise πζ and f are
-separate parts. If phigen does not know the flow of πζ, its summands πζ_i dx_i are parts, one for each component of ζ;
-if it does not know the flow of f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i
-times a factor. It is tangent to the symplectic leaves, so each summand of πζ preserves the Casimirs.
+Forces have the vector field πζ + f, with the covector force ζ and the vector force f. The whole field is one part if
+phigen knows its flow, in closed form or by a matrix exponential. Otherwise πζ and f are separate parts. If phigen does
+not know the flow of πζ, its summands πζ_i dx_i are parts, one for each component of ζ; if it does not know the flow of
+f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i times a factor. It is tangent to
+the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
 Damping is ζ = λπb with b = ∇H. If its flow is not known, each block of π has flows of its own, from the components of b
 in the block. If these components together have no flow, they are divided into two summands: the terms that do not
@@ -36,7 +36,7 @@ _DAMPING_HINT = (
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
-    """Return the flows of the forces of a system, as parts of a splitting; () without forces.
+    """Return the flows of the forces of a system, as parts of a splitting; () if there are no forces.
 
     Raises `SpecError` if a summand of the forces has no flow; the error names the summand.
     """

@@ -40,7 +40,7 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
     """Sum terms whose vector fields have monomials that cancel each other, and return the resulting list of
     terms.
 
-    Returns None if there are no such terms, or if no sum has a flow.
+    Returns None if no monomials cancel, or if no sum has a flow.
     """
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}
@@ -61,8 +61,8 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """Return a list that contains only the sum of the terms ``group``; None if this is one term, or if the sum has no
-    flow.
+    """Return a list that contains only the sum of the terms ``group``. Returns None if ``group`` is a single term, or
+    if phigen knows no flow of the sum.
     """
     if len(group) == 1:
         return None

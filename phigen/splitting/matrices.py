@@ -23,12 +23,12 @@ from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import EXPONENTIAL, Symbol
 from phigen.symbolic.tower import Poly
 
-#: Largest number of rows of A, since a step multiplies a vector by the whole matrix, and largest number of factors in
-#: an unknown.
+#: MOST_ROWS: the largest number of rows of A; each step multiplies a vector by the whole matrix. MOST_DEGREE: the
+#: largest number of factors in an unknown.
 MOST_ROWS, MOST_DEGREE = 64, 8
 
 #: PADE: the coefficients of the numerator of the Padé approximant of order 6 for exp. MAX_PADE_NORM: the largest norm
-#: of a matrix for which the approximant is used. For such a matrix its error is at most 2·10⁻¹⁷.
+#: of a matrix for which the approximant is used. The error of the approximant is then at most 2·10⁻¹⁷.
 PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
 MAX_PADE_NORM = 0.5
 
@@ -67,7 +67,7 @@ class MatrixExponential:
             columns = wider
 
     def slopes(self) -> dict[str, Expression]:
-        """Return the time derivatives of the entries of exp(tA) − 1, by the symbol of the entry. The matrix of these
+        """Return a dictionary: symbol of an entry of exp(tA) − 1 → time derivative of this entry. The matrix of these
         derivatives is A exp(tA).
         """
         n, entries = self.size, self.symbols

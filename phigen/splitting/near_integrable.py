@@ -24,9 +24,9 @@ from phigen.symbolic.tower import Generator, Poly
 #: Dimensions of space in which Kepler motions are recognised.
 _DIMENSIONS = (2, 3)
 
-#: Largest ratio ε of the coefficients of the perturbations to those of the motions for which methods for
-#: near-integrable systems are used. Below it, their errors ε² h^6 and ε³ h^4 for steps of size h are smaller than those
-#: of general methods of order 4.
+#: Methods for near-integrable systems are used if the ratio ε of two sums is below this number: the sum of the
+#: coefficients of the perturbations, and that of the motions. These methods have the errors ε² h^6 and ε³ h^4 for steps
+#: of size h. For so small an ε these errors are smaller than those of general methods of order 4.
 SMALL = 0.02
 
 
@@ -69,7 +69,7 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
 
 
 def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
-    """Whether every monomial of a term has at least one of these variables of the ring as a factor."""
+    """Whether every monomial of a term contains one of the ``variables``. They are indices of variables of the ring."""
     return all(any(exponents[v] for v in variables) for exponents in term.element.to_dict())
 
 

@@ -29,9 +29,9 @@ MAX_COMPANIONS = 3
 class SplitHamiltonian:
     """H as a sum of parts: the flows of the parts, in the order in which a step applies them.
 
-    ``kick`` is set if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`): it is the index of the part
-    V. The Hamiltonian of this flow may contain κ{V, {V, T}}. ``small`` is set for a near-integrable H = A + εB: it is
-    the index of the part εB.
+    ``kick`` is set if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`). It is then the index of the
+    part V. The Hamiltonian of the flow of this part may also contain κ{V, {V, T}}. ``small`` is set for a
+    near-integrable H = A + εB: it is the index of the part εB.
     """
 
     flows: tuple[Flow, ...]
@@ -110,9 +110,8 @@ def _candidates(
 ) -> Iterator[list[Term]]:
     """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
-    The lists differ in their terms, in this order: terms as written; squares of sums as single terms; motions as single
-    terms; sums by blocks of π; terms after subtraction of companions (Casimirs and similar functions); and sums of
-    groups of terms.
+    The lists come in this order: terms as written; squares of sums as single terms; motions as single terms; sums by
+    blocks of π; terms after subtraction of companions (Casimirs and similar functions); and sums of groups of terms.
     """
     yield terms
     ring = conflicts.ring

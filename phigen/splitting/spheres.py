@@ -66,7 +66,9 @@ class _Sphere:
     def drawn(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
         """Return the increments of a field ẋ = (β·x)x − |x|²β with β = (v·x)w, w parallel to v; None for other fields.
 
-        Then β = Ax with A = M + g, where M = v wᵀ has rank 1. The number g has no effect on the motion.
+        The matrix M of β = Mx has rank 1. The rates determine M only up to a multiple of the unit matrix, since β = gx
+        with a number g adds nothing to the rates. So a matrix A is read from the rates, and g is chosen such that M = A
+        − g has rank 1.
         """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]

@@ -70,7 +70,9 @@ def _exponential_statements(system: System, splitting: SplitHamiltonian) -> Iter
 
 
 def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
-    """Return the statement that the vector fields of the parts for forces sum to πζ + f."""
+    """Return the statement that the vector fields of the parts for forces sum to πζ + f, with the covector force ζ and
+    the vector force f.
+    """
     slope = gradient(system.hamiltonian, system.coordinates)
     force_field = [
         a - b for a, b in zip(system.vector_field(), hamiltonian_vector_field(system.poisson, slope), strict=True)

@@ -8,8 +8,8 @@ and D = √(1 − QS²). For the argument √P t and the modulus √(Q/P), these
 
 `AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q. Full turns are subtracted from φ, so that |κ|√P ≤ 1. The
 argument is R rather than Q because R is small near a separatrix, where the difference P − Q would lose digits. The
-derivatives of κ contain the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 0 to t. They contain
-no division by P, Q or R:
+derivatives of κ contain the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 0 to t. The formulas
+of the derivatives contain no division by P, Q or R:
 
     ∂κ/∂t = (1 + z)D/4,  ∂κ/∂R = (1 + z)DI/8,  ∂κ/∂P = (1 + z)DG/8 − κ³(5 − 2z + z²)/(1 + z)³.
 

@@ -125,7 +125,9 @@ class Expression:
 
 
 class _Reference(ref[Expression]):
-    """Weak reference to a node, under ``key`` in the table of all nodes; its finaliser removes the entry."""
+    """Weak reference to a node. It is stored under ``key`` in the table of all nodes, and removed from the table when
+    the node is deleted.
+    """
 
     __slots__ = ("key",)
 
@@ -178,7 +180,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """Return a node without simplification. It is used by passes that choose the form of the code themselves."""
+    """Return a node without simplification, for passes that choose the form of the code themselves."""
     return _node(op, args, value)
 
 
@@ -529,7 +531,8 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
 
 
 def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
-    """Return the nonzero partial derivatives of each root, by the name of the symbol.
+    """Return one dictionary for each root: name of a symbol → partial derivative with respect to this symbol.
+    Derivatives that are 0 are left out.
 
     The results equal those of `derivatives`, but one walk over the expressions serves all names.
     """

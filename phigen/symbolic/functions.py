@@ -32,17 +32,17 @@ class Function:
 
     ``slopes(call, f, *arguments)`` returns the partial derivatives, where f is the value of the function; ``slopes`` is
     None if they are unknown. ``known(call, *arguments)`` expresses the function by well-known functions.
-    ``value(library, *arguments)`` computes the function with those of a library, `math` or an mpmath context; if
-    ``value`` is None, the library must have a function of the same name. ``at_zero`` is the value at 0, or None if it
-    is not rational. ``parity`` is even or odd. ``inverse`` is the name of the inverse function. ``defined`` tests
-    whether the function has a value at rational arguments, and ``rational`` is true if this value is rational.
-    ``cost`` is the time of a call in units of one addition. An ``own`` function is internal: a spec cannot use it.
+    ``value(library, *arguments)`` computes the function by other functions from a library, `math` or an mpmath context;
+    if ``value`` is None, the library must have a function of the same name. ``at_zero`` is the value at 0, or None if
+    it is not rational. ``parity`` is even or odd. ``inverse`` is the name of the inverse function. ``defined`` tests
+    whether the function has a value at rational arguments, and ``rational`` is true if this value is rational. ``cost``
+    is the time of a call in units of one addition. An ``own`` function is internal: a spec cannot use it.
 
     ``written`` maps a language to the spelling of the function: a name, or a text with ``{0}``, ``{1}`` for the
     arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in C
     loops over SIMD lanes: the name of a vectorised version, or a formula that contains only vectorised functions.
-    ``inline`` is true if the code contains only arithmetic or one instruction, and no call. ``near`` is true if flows
-    replace the function by a polynomial for small arguments. ``letters`` is the name in mathematics.
+    ``inline`` is true if compiled C computes the function by arithmetic or one instruction, without a call. ``near`` is
+    true if flows replace the function by a polynomial for small arguments. ``letters`` is the name in mathematics.
     """
 
     name: str
@@ -320,7 +320,8 @@ _LISTED = (
 
 
 def _phi(order: int) -> Function:
-    """Return the record of φ (`phigen.symbolic.special`), or of its derivative of this ``order``, 1 or 2.
+    """Return the record of φ (`phigen.symbolic.special`) for ``order`` 0, or of the derivative φ′ or φ″ for ``order`` 1
+    or 2.
 
     The ``cost`` in the record is the time for small arguments: a series of nine terms, and a test of the argument.
     """

@@ -78,7 +78,7 @@ def variation(name: str) -> Symbol:
 
 
 def cotangent(name: str) -> Symbol:
-    """Return the symbol of a cotangent: the derivative of the final result with respect to a value."""
+    """Return the symbol of a cotangent: the derivative of the user's function with respect to the value ``name``."""
     return Symbol(COTANGENT, name)
 
 

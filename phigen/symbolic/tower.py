@@ -271,7 +271,7 @@ class Tower(Arithmetic[Poly]):
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
             numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
             return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
-        if name == "arcroot":  # by functions of s/4, which formulas of flows contain too
+        if name == "arcroot":  # written with functions of s/4, since formulas of flows contain these too
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
@@ -470,8 +470,8 @@ class Tower(Arithmetic[Poly]):
         return self._sampled
 
     def numerator(self, element: Poly) -> Poly:
-        """Return the element times a function without zeros that removes all reciprocals. The relations of generators
-        are used.
+        """Return the product of the element and a function without zeros, chosen such that the product contains no
+        reciprocals. The relations of generators are used.
         """
         degrees = element.degrees()
         for g in reversed(self.generators):

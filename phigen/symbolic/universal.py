@@ -5,9 +5,9 @@ For q̈ = −μq/r³, let r = |q| and η = q·q̇ at the start, and β = 2μ/r �
     r G1 + η G2 + μ G3 = t,    G1 = s sinroot(βs²),  G2 = s² sinroot(βs²/4)²/2,  G3 = s³ arcroot(βs²)
 
 (E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). The G_n are functions of Stumpff: G0 is
-cosroot(βs²), G0' = −βG1 and G_n' = G_{n−1}. The derivative of the left-hand side by s is the distance at s, r G0 + η G1
-+ μ G2 > 0, so that there is one solution. The derivatives of s follow by differentiating the equation; no formula
-divides by β.
+cosroot(βs²), G0' = −βG1 and G_n' = G_{n−1}. The derivative of the left-hand side with respect to s is the distance at
+s, r G0 + η G1 + μ G2 > 0, so there is one solution. The derivatives of s follow by differentiating the equation; no
+formula divides by β.
 """
 
 from __future__ import annotations

@@ -31,9 +31,9 @@ MOST_LISTED = 1000
 class Statement:
     """A statement with its verdict.
 
-    ``verdict`` is one of four. ``proved``: in exact arithmetic, for all values of the symbols. ``refuted``:
-    ``residual`` should be zero and is not. ``checked numerically``: ``detail`` gives the number of points and the
-    tolerance. ``undecided``: phigen found no proof, and no point where all functions are defined.
+    ``verdict`` is one of four words or phrases. ``proved``: true in exact arithmetic, for all values of the symbols.
+    ``refuted``: ``residual`` should be zero and is not. ``checked numerically``: ``detail`` gives the number of points
+    and the tolerance. ``undecided``: phigen found no proof, and no point where all functions are defined.
 
     A refuted statement may have several parts, such as one for each triple of coordinates in the Jacobi identity.
     ``failing`` lists the parts that do not reduce to 0, as pairs (label, residual).
