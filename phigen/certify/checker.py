@@ -186,7 +186,8 @@ class Evaluation:
 def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
     """Return value and derivative of a function that the C computes by a polynomial, and a bound for the error.
 
-    The error is that of the polynomial and of its rounding. ``series`` describes the polynomial; s is the argument.
+    The bound covers the error of the polynomial and rounding errors. ``series`` describes the polynomial; s is the
+    argument.
     """
     name, beyond = series["name"], series["beyond"]
     if beyond and mag(s) >= series["radius"]:  # such large arguments go to the function of libm

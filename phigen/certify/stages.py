@@ -357,7 +357,7 @@ def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence
     """Return the least and the largest number of terms that the C uses in Taylor series of paths from a box of
     states.
 
-    The third result is the index of a coordinate. Its series cannot end before the least number of terms.
+    The third result is the index of a coordinate whose series cannot end before the least number of terms.
     """
     listing = Listing()
     x = listing.inputs("x", n)

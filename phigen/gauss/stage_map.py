@@ -1,9 +1,9 @@
 """Stages of a Gauss step: coordinates and derivatives as functions of the unknowns, and the change of frame.
 
-The unknowns are offsets, which are 0 at the start of a step, so that small steps lose no digits. They are x − x_start
-for a plain coordinate, t − t_start for the time, and log x − log x_start for a coordinate whose logarithm is an
-unknown. For a group element G they are the components of G − 1, or those of U − F if there is a frame F
-(`phigen.gauss.lift`), where U = FG. If the star algebra has a square-zero ideal (`phigen.gauss.square_zero`), the
+The unknowns are offsets, which are 0 at the start of a step, so that small steps lose no digits. The offset is x −
+x_start for a plain coordinate, t − t_start for the time, and log x − log x_start for a coordinate whose logarithm is an
+unknown. For a group element G the offsets are the components of G − 1 or, if there is a frame F (`phigen.gauss.lift`),
+the components of U − F with U = FG. If the star algebra has a square-zero ideal (`phigen.gauss.square_zero`), the
 components of G along the ideal are replaced by λ − λ_start for the functional λ.
 """
 

@@ -1,8 +1,8 @@
 """Decomposition of a Lie algebra into a direct sum of ideals, as in so(4) = so(3) ⊕ so(3).
 
 The elements of the basis need not lie in the ideals. The projections onto the ideals commute with every ad_X. So they
-lie in the centroid, the space of linear maps T with T[X, Y] = [TX, Y]. They follow from primary decompositions of
-elements of the centroid over Q.
+lie in the centroid, the space of linear maps T with T[X, Y] = [TX, Y]. The projections are found from primary
+decompositions of elements of the centroid over Q.
 """
 
 from __future__ import annotations

@@ -144,7 +144,7 @@ def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Itera
     """Yield the matrices (½ad_X X; 0 0) on the space g ⊕ R, where g is the Lie algebra and X runs over its
     basis.
 
-    They represent g if [[g, g], g] = 0; for other algebras nothing is yielded.
+    These matrices represent g if [[g, g], g] = 0; for other algebras nothing is yielded.
     """
     derived = [set(row) for row in algebra.constants.values()]
     touched = sorted({k for row in derived for k in row})

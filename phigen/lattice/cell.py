@@ -206,8 +206,8 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """Return the terms of ∂H/∂f at a site of a grid, for each field f. They are derivatives of all terms of H that read
-    the site.
+    """Return the terms of ∂H/∂f at a site of a grid, for each field f. These are the derivatives of all terms of H that
+    read the site.
     """
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:

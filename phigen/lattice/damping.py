@@ -2,10 +2,10 @@
 λ.
 
 The covector b depends on neighbours, which are damped too. Therefore b is written as a sum of two parts, each with its
-own flow. The first part has the terms that do not depend on the site itself. It has an elementary flow as long as the
-neighbours stand still. So sites are coloured such that no two neighbours have the same colour, and the flow is applied
-to one colour after the other. The second part has the remaining terms, which depend on the fields of the site. Its flow
-is applied to all sites at once.
+own flow. The first part has the terms that do not depend on the site itself. This part has an elementary flow as long
+as the neighbours stand still. So sites are coloured such that no two neighbours have the same colour, and the flow is
+applied to one colour after the other. The second part has the remaining terms, which depend on the fields of the site.
+The flow of the second part is applied to all sites at once.
 """
 
 from __future__ import annotations

@@ -130,8 +130,8 @@ def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.i
     """Return the integral of a function over each of several intervals.
 
     ``values`` has the function at equidistant points. On each interval, the polynomial through the ``count`` nearest
-    points is integrated. An interval begins at the point whose index is in ``stencil_starts``. Its length, in
-    ``lengths``, is in units of the distance between two points.
+    points is integrated. An interval begins at the point whose index is in ``stencil_starts``. ``lengths`` has the
+    lengths of the intervals, in units of the distance between two points.
     """
     count = min(count, len(values))
     starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)

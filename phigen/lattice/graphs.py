@@ -50,8 +50,7 @@ _OTHER = {"a": "b", "b": "a"}
 class GraphSearch(PartSearch):
     """Search for the parts of H on a graph, whose colours are known only at run time.
 
-    A term in a part is a pair: the summand of H, and its class `WHOLE`, `BEGINS` or `ENDS_THERE`, which takes the place
-    of a colour.
+    A term in a part is a pair: a summand of H, and `WHOLE`, `BEGINS` or `ENDS_THERE` in place of a colour.
     """
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)

@@ -367,8 +367,8 @@ class PartSearch:
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
         """Return the flow of a sum of commuting terms of H.
 
-        ``more`` has the terms of {V, {V, T}} in a modified potential V + κ{V, {V, T}}. They are multiplied by the
-        symbol `KICK`, which stands for κ.
+        ``more`` has the terms of {V, {V, T}} in a modified potential V + κ{V, {V, T}}. These terms are multiplied by
+        the symbol `KICK`, which stands for κ.
         """
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}

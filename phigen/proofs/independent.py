@@ -47,7 +47,7 @@ Pair = tuple[str, Any, Any]
 
 @dataclass(frozen=True)
 class Agreement:
-    """Result of comparing both derivations of S_``term``; if ``term`` is None, those of ∇S_h, or of α and β.
+    """Result of comparing two derivations of S_``term`` or, if ``term`` is None, of ∇S_h, or of α and β.
 
     ``sympy`` and ``compiler`` are the seconds that the two derivations took for S_1 … S_``term``. ``compiler`` is None
     if the time is not known.

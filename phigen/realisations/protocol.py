@@ -29,9 +29,9 @@ class BiRealisation:
     - ``displacement``: α − x, in a form in which no terms of the size of x cancel
     - ``increment``: β − α, in a form with the same property
     - ``symmetric``: whether β(x, p) = α(x, −p)
-    - ``exact``: false for a truncated series. Its steps are Poisson maps only up to a power of the step size
-    - ``degree``: for a truncated series, the degree in p up to which α and β are correct; their brackets are correct up
-      to one degree less
+    - ``exact``: false for a truncated series. Steps are then Poisson maps only up to a power of the step size
+    - ``degree``: for a truncated series, the degree d in p up to which α and β are correct; the brackets of their
+      components are correct up to degree d − 1
     - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction). Then ``alpha`` and ``beta`` are
       truncated series; the S_i are computed from these, but no step evaluates them
     - ``inner``: for a pull-back, the system in the coordinates y in which the spec states π, and the bi-realisation of

@@ -236,9 +236,9 @@ class CSolver:
         """Return arguments of an ensemble for the C: parameters, times or gauges, and step sizes.
 
         The parameters are an array (members, parameters), the step sizes an array (members,). The second result is a
-        list. If H depends on the time, it contains the initial times (members,). Otherwise, if Casimirs are subtracted
-        from H, it contains the gauges, that is the multiples of Casimirs (members, Casimirs), or None if the C chooses
-        the gauges. In all other cases the list is empty.
+        list. If H depends on the time, the list contains the initial times (members,). Otherwise, if Casimirs are
+        subtracted from H, the list contains the gauges, that is the multiples of Casimirs (members, Casimirs), or None
+        if the C chooses the gauges. In all other cases the list is empty.
         """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))

@@ -34,8 +34,8 @@ BLOCK = 64
 #: Number of intervals into which a step with a collocation polynomial is divided. g is evaluated at the ends of the
 #: intervals. Four intervals suffice to find the extrema of a motion that makes half a turn in a step.
 SAMPLES = 4
-#: g on a collocation polynomial is differentiated by a central difference. Its two points lie before and after the zero
-#: at this distance, as a fraction of a step: about the cube root of the machine epsilon.
+#: g on a collocation polynomial is differentiated by a central difference. The two points of the difference lie at this
+#: distance before and after the zero, as a fraction of a step. This is about the cube root of the machine epsilon.
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8

@@ -164,8 +164,8 @@ def march_at(
 def _session_at_time(
     session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
 ) -> tuple[Session, float]:
-    """Return a session at the time ``span`` after the start, and its number of steps. Inside a step, the number has a
-    fraction.
+    """Return a session at the time ``span`` after the start, and the number of steps from the start to this time, with
+    a fraction if the time is inside a step.
 
     ``advance(n)`` makes n whole steps with ``session``; it is called for the whole steps before that time.
     """

@@ -7,8 +7,8 @@ S_t solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0, hence S_1 = H and
 The S_i of the paper (docs/mathematics.md cites it) have an additional factor i!. A bi-realisation is symmetric if
 β(x, p) = α(x, −p). Then every S_i of even index vanishes. The recursion relies on this; `residual` can prove it.
 
-If H depends on a time τ, then τ and its conjugate variable e, with {τ, e} = 1, are added to the coordinates. Their
-bi-realisation is the midpoint rule, and H(τ, x) is replaced by H(τ, x) + e. The generating function is then
+If H depends on a time τ, then τ and its conjugate variable e, with {τ, e} = 1, are added to the coordinates. The
+bi-realisation of τ and e is the midpoint rule, and H(τ, x) is replaced by H(τ, x) + e. The generating function is then
 t e + S_t(τ, x), where S_t does not contain e and τ is the time in the middle of the step:
 
     ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0.

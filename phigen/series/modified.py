@@ -3,13 +3,13 @@
 A step of size h is the flow, over the time h, of a formal series H̃_h = H_0 + h H_1 + h² H_2 + … with H_0 = H. The
 generating function of H̃_h is the solution of the Hamilton–Jacobi equation without truncation. At the time h it must be
 S_h = h S_1 + … + h^k S_k, the generating function of the method; the H_j follow from this condition. At the time σh
-with 0 ≤ σ ≤ 1, the solution for H̃_h is S(σ) = Σ h^r s_r(σ). Its terms satisfy
+with 0 ≤ σ ≤ 1, the solution for H̃_h is S(σ) = Σ h^r s_r(σ). The s_r satisfy
 
     ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0.
 
-The condition is s_r(1) = S_r for r ≤ k and s_r(1) = 0 for r > k. It gives a linear equation for each H_{r−1}. The first
-correction is −h^k S_{k+1}. In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does H̃_h: on
-the right H̃_h is evaluated at τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. For
+The condition is s_r(1) = S_r for r ≤ k and s_r(1) = 0 for r > k. This gives a linear equation for each H_{r−1}. The
+first correction is −h^k S_{k+1}. In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does
+H̃_h: on the right H̃_h is evaluated at τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. For
 canonical structures, see E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX.
 """
 

@@ -1,7 +1,8 @@
 """Sums of terms of H whose joint flow is simpler than the flows of the single terms, such as rotations about a vector.
 
-*Cancelling terms.* For m·N on se(3)*, each term m_i N_i changes m and N by products of both. Their sum changes neither
-m nor N, and rotates other vectors about N. Terms are summed if monomials of their vector fields cancel.
+*Cancelling terms.* For m·N on se(3)*, each term m_i N_i changes m and N by products of m and N. The sum of the three
+terms changes neither m nor N, and rotates other vectors about N. Terms are summed if monomials of their vector fields
+cancel.
 
 *Linear terms.* In Σ v_i m_i let all v commute with each other and with all m. Then v is constant along the flow, and m
 satisfies linear equations: the flow is a rotation about v, a shear, or another linear action of the algebra.

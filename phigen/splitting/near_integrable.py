@@ -24,9 +24,9 @@ from phigen.symbolic.tower import Generator, Poly
 #: Dimensions of space in which Kepler motions are recognised.
 _DIMENSIONS = (2, 3)
 
-#: Methods for near-integrable systems are used if the ratio ε of two sums is below this number: the sum of the
-#: coefficients of the perturbations, and that of the motions. These methods have the errors ε² h^6 and ε³ h^4 for steps
-#: of size h. For so small an ε these errors are smaller than those of general methods of order 4.
+#: Let ε be the sum of the coefficients of the perturbations, divided by the sum of the coefficients of the motions. If
+#: ε is below this number, methods for near-integrable systems are used. In steps of size h, their errors ε² h^6 and ε³
+#: h^4 are then smaller than the errors of general methods of order 4.
 SMALL = 0.02
 
 

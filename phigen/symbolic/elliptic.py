@@ -111,7 +111,7 @@ def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tupl
 def value(library: Any, t: Any, p: Any, r: Any) -> Any:
     """Return κ = tan(φ/4)/√P, where φ is Jacobi's amplitude of √P t with the modulus √(1 − R/P).
 
-    The precision is double if the library is `math`, else that of an mpmath context.
+    ``library`` is `math`, for double precision, or an mpmath context, for the precision of this context.
     """
     return _reduced(library, t, p, r)[0]
 

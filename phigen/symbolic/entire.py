@@ -154,6 +154,6 @@ def precisely(context: Any, name: str, s: Any) -> Any:
 def value(library: Any, name: str, s: Any) -> Any:
     """Return the value of a function of `ENTIRE`.
 
-    The precision is double if the library is `math`, else that of an mpmath context.
+    ``library`` is `math`, for double precision, or an mpmath context, for the precision of this context.
     """
     return in_double(name, s) if library is math else precisely(library, name, s)

@@ -69,7 +69,7 @@ def times_x(coefficients: Any, a: Any) -> list[Any]:
 def value(k: int, library: Any, t: Any, *a: Any) -> Any:
     """Return F_k: 1 + Σ F_k x^k is the remainder of e^{tx} on division by x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0.
 
-    The precision is double if the library is `math`, else that of an mpmath context.
+    ``library`` is `math`, for double precision, or an mpmath context, for the precision of this context.
     """
     return _coefficients(library, t, a)[0][k]
 
@@ -77,8 +77,7 @@ def value(k: int, library: Any, t: Any, *a: Any) -> Any:
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
     """Return G_k: Σ G_k x^k is the remainder of the quotient (e^{tx} − 1 − Σ F_k x^k)/p on division by p.
 
-    Here p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0, and F_k is the result of `value`. The precision is double if the
-    library is `math`, else that of an mpmath context.
+    Here p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0, and F_k is the result of `value`, where ``library`` is explained.
     """
     return _coefficients(library, t, a)[1][k]
 

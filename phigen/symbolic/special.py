@@ -114,7 +114,7 @@ def precisely(context: Any, order: int, s: Any) -> Any:
 def value(library: Any, order: int, s: Any) -> Any:
     """Return the derivative of φ (see `coefficient`) of this order at s.
 
-    The precision is double if the library is `math`, else that of an mpmath context.
+    ``library`` is `math`, for double precision, or an mpmath context, for the precision of this context.
     """
     return in_double(order, s) if library is math else precisely(library, order, s)
 

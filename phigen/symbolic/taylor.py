@@ -99,8 +99,8 @@ class ExpressionRing(Arithmetic[Expression]):
 def closure(roots: Sequence[Expression]) -> list[Expression]:
     """Return all nodes whose series are needed for the series of the expressions.
 
-    The nodes are those of the expressions and those of partial derivatives, since the series of f(a) is computed from
-    that of f'(a). Arguments come before the nodes that use them.
+    Nodes of partial derivatives are included, since the series of f(a) is computed from the series of f'(a). Arguments
+    come before the nodes that use them.
     """
     closed = list(roots)
     while True:

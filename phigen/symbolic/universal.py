@@ -50,9 +50,9 @@ def slopes(
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
     """Return the universal anomaly s of a Kepler motion q̈ = −μq/r³ after the time t.
 
-    The arguments are r = |q|, η = q·q̇, β = 2μ/r − q̇² and ``spin`` = |q × q̇|² at the start. The precision is double
-    if the library is `math`, else that of an mpmath context. Raises `ValueError` if there is no value: at r = 0, and
-    after a collision of a radial motion.
+    The arguments are r = |q|, η = q·q̇, β = 2μ/r − q̇² and ``spin`` = |q × q̇|² at the start. ``library`` is `math`,
+    for double precision, or an mpmath context, for the precision of this context. Raises `ValueError` if there is no
+    value: at r = 0, and after a collision of a radial motion.
     """
     if not r > 0:
         raise ValueError("the distance of a Kepler motion is not positive")
