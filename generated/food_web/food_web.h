@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 89dde510f01780b85d7f7d0186b00c0a68c5a175ab1d91b26167b6bcd01c3ecb
+ * body-sha256: b1dc727931af1d3c4fd50b31fbc096d10843d77de4a9e61068f91e7cd92982cf
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -23,7 +23,7 @@ typedef struct {
 
 extern const food_web_params food_web_default_params;
 
-enum { food_web_ARRAYS = 2 };        /* number of arrays over the sites: fields, then parameters */
+enum { food_web_ARRAYS = 2 };        /* number of arrays over sites: fields, parameters */
 enum { food_web_COEFFICIENTS = 26 }; /* number of coefficients: functions of params and h */
 enum { food_web_GATHERED = 1 };      /* number of sums over bonds or pairs that are stored for each site */
 enum { food_web_BOND_ARRAYS = 1 };   /* number of parameters at bonds */

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 492adca9c518edbafd4e65aeac4ed3a2f2b030c0ec87e2b82895086c71a0ab73
+ * body-sha256: c9e2d8ac9b4f30b12ce295ec83fe9cd32e5c94d8fcf67085ba726952f0b459d7
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -23,7 +23,7 @@ typedef struct {
 
 extern const heisenberg_params heisenberg_default_params;
 
-enum { heisenberg_ARRAYS = 4 };        /* number of arrays over the sites: fields, then parameters */
+enum { heisenberg_ARRAYS = 4 };        /* number of arrays over sites: fields, parameters */
 enum { heisenberg_COEFFICIENTS = 18 }; /* number of coefficients: functions of params and h */
 
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2a2bf7a6dd486e139f723939bdacd9ec946c961ffd066838b6354f492b67a106
+ * body-sha256: f9e8288bed05914c589071e7f563485d9cca8e3a7e21419e3bbb5e952bc84163
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -22,7 +22,7 @@ typedef struct {
 
 extern const point_vortices_params point_vortices_default_params;
 
-enum { point_vortices_ARRAYS = 3 }; /* number of arrays over the sites: fields, then parameters */
+enum { point_vortices_ARRAYS = 3 }; /* number of arrays over sites: fields, parameters */
 enum { point_vortices_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
 enum { point_vortices_STAGES = 5 }; /* number of stages of a step */
 enum { point_vortices_DIRECTIONS = 24 }; /* dimension of a Krylov space */

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: bd6e31f43f4f0c361e290ec28da9336c3eb2a263029cc75c183847355935054b
+ * body-sha256: 5f68025dd61376d289eb998a7359e09c624d04721339a91aa61726833d7669d5
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -33,8 +33,7 @@ enum { thermal_spin_MAX_ITERATIONS = 20 }; /* largest number of iterations for a
 /* iterations end if the next correction is expected to be below this, relative to y */
 #define thermal_spin_TOLERANCE 1e-20
 
-/* normal variates are truncated here: rare larger values would make steps fail */
-#define thermal_spin_BOUND 6.0
+#define thermal_spin_BOUND 6.0 /* largest normal variate; steps could fail with larger ones */
 
 static int thermal_spin_allowed(const thermal_spin_params *params)
 {

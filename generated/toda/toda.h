@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 716233cb734eea1b59ad603e595ee7c6fc80d3e8e73583b7d89aa6b41f0f7dbf
+ * body-sha256: edee590a858e44fe361517fc302078210d0085e7923948ef1c7d9cda10d6aee4
  */
 #ifndef TODA_H
 #define TODA_H
@@ -22,7 +22,7 @@ typedef struct {
 
 extern const toda_params toda_default_params;
 
-enum { toda_ARRAYS = 2 };        /* number of arrays over the sites: fields, then parameters */
+enum { toda_ARRAYS = 2 };        /* number of arrays over sites: fields, parameters */
 enum { toda_COEFFICIENTS = 28 }; /* number of coefficients: functions of params and h */
 
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,

@@ -36,7 +36,7 @@ def declarations(program: Program, step: Sweeps) -> str:
         (
             "ARRAYS",
             arrays,
-            f"number of arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}",
+            f"number of arrays over sites: fields, parameters{', noise' * bool(program.noise)}",
         ),
         ("COEFFICIENTS", max(1, step.row * rows_of(step)), "number of coefficients: functions of params and h"),
     ]
@@ -251,7 +251,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         yield (
             "REMAINDER",
             1 + bodies.remainder,
-            "number of the part of H that remains beside the Kepler motions, counted from 1",
+            "number, from 1, of the part of H besides the Kepler motions",
         )
     if has["WAVES"]:
         distances = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
