@@ -136,7 +136,7 @@ def _row_times(
             continue
         if end is not None and not min(start, end) <= time <= max(start, end):
             span = f"between {float(start):.9g} and {float(end):.9g}"
-            declared.reader.error(node, f"at: {node.text} is not {span}, where the run begins and ends")
+            declared.reader.error(node, f"at: {node.text} is not {span}, the start and the end of the run")
         times.append(time)
     return tuple(sorted(set(times), reverse=step is not None and step < 0))
 

@@ -77,7 +77,7 @@ MEANINGS = (
     Meaning(
         "energy: last/first window",
         "the largest energy error in the last tenth of the run, divided by that in the first tenth: about 1 if the "
-        "error oscillates, 10 if it drifts. It is judged if the coordinates keep the ranges of the first "
+        "error oscillates, 10 if it drifts. The ratio is judged if the coordinates keep the ranges of the first "
         "half of the run",
         _DRIFT,
     ),
@@ -137,7 +137,8 @@ MEANINGS = (
     ),
     Meaning(
         "reversibility",
-        "the distance from the start after a step of h and a step of −h. It is judged for symmetric methods",
+        "the distance from the start after a step of h and a step of −h. The distance is judged for symmetric "
+        "methods only",
         "the method is not symmetric, or the equation of a step was not solved to rounding",
     ),
     Meaning(
@@ -154,7 +155,7 @@ MEANINGS = (
     Meaning(
         "largest step",
         "the largest step for which the equation of a step has a solution, as a multiple of the step of the run. "
-        "Larger steps than 256 times that of the run are not tried",
+        "Steps larger than 256 times the step of the run are not tried",
         "the step of the run itself fails: use a smaller one",
     ),
     Meaning(

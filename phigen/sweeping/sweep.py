@@ -144,7 +144,7 @@ def _workers(target: str, spec: Spec, sweep: SweepSettings, setting: SweepSettin
         if setting.target is not None:
             raise
         place = spec.diagnostic(("sweeps", sweep.name, "target"), "").location
-        raise type(error)(f"{place}: {error}\n  hint: -t chooses another target") from error
+        raise type(error)(f"{place}: {error}\n  hint: choose another target by -t") from error
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
