@@ -128,8 +128,8 @@ def expect_runnable(target: str) -> None:
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas of the method that `compile` uses, in sympy: α, β, S_1 … S_k, and the discretised
-    Hamiltonian.
+    """Return the formulas of the method that `compile` uses, in sympy: the maps α and β, the terms S_1 … S_k, and the
+    discretised Hamiltonian.
 
     ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`. Also raises
     `SpecError` for a splitting, which has none of these formulas.

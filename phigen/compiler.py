@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Order of the series from which the cost of a series of higher order is estimated. Its number of operations is a lower
-#: bound for that of the longer series, which would take long to build.
+#: A series of high order takes long to build. Its cost is estimated from the series of this order: the number of
+#: operations of the shorter series is a lower bound.
 PREVIEW_ORDER = 4
 
 #: Least number of sites of a lattice that is recognised if a spec writes out the equations of all its sites. Specs with
-#: fewer coordinates are not examined.
+#: fewer coordinates than this are not examined.
 LEAST_LATTICE_SITES = 8
 
 
@@ -351,8 +351,7 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
     With the key ``coordinates_from``, there is one part for each body. Otherwise some parts may be known motions, such
     as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. Known motions are not used
-    with a monitor. Neither are they used if the whole of H would be one known motion although the spec names a
-    composition.
+    with a monitor. They are not used either if the spec names a composition and the whole of H is one known motion.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
@@ -366,7 +365,7 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 def _turns_bodies(spec: Spec, system: System) -> bool:
     """Whether free rigid bodies may be parts of H.
 
-    They may not if the spec reconstructs an attitude other than that of a rigid body.
+    They may not be parts if the spec reconstructs an attitude other than that of a rigid body.
     """
     group = _group(spec, system, "exponential")
     if group is None:

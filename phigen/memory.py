@@ -42,8 +42,8 @@ def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.f
     """Return a new array, filled with NaN. Raises `LimitError` if it does not fit into memory; ``what`` is its
     name.
 
-    Writing NaN takes the memory at once. Memory of an array by ``np.empty`` would still count as available when the
-    next array is allocated.
+    Writing NaN takes the memory at once. The memory of an array from ``np.empty`` would still count as available when
+    the next array is allocated.
     """
     expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
     return np.full(shape, np.nan, dtype)

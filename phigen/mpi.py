@@ -549,8 +549,8 @@ class _Frames:
 class _StoredState:
     """Files with the state of a run, from which the run can be continued after an interruption.
 
-    A JSON file at ``path`` describes the state. Its values are in one of two further files, which are written
-    alternately, so that the last complete state is never overwritten.
+    A JSON file at ``path`` describes the state. The values of the state are in one of two further files, which are
+    written alternately, so that the last complete state is never overwritten.
     """
 
     def __init__(self, domain: _Domain, path: Path, run: Sequence[float]) -> None:

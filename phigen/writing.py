@@ -1,8 +1,8 @@
 """Atomic writing of files: one file, or several files together, are replaced completely or not at all.
 
-Contents are first written to temporary files in the same folder. When all contents are on the disk, the temporary files
-replace the files. So readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name
-the file.
+Contents are first written to temporary files, each in the folder of the file that it will replace. When all contents
+are on the disk, the temporary files replace the files. So readers never see incomplete files, and a full disk leaves
+the old files unchanged. Errors name the file.
 """
 
 from __future__ import annotations

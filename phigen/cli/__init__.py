@@ -31,7 +31,7 @@ COMMANDS = {
     "verify": ("phigen.cli.verify", "Build every target and measure order and conservation."),
     "certify": ("phigen.cli.certify", "Bound the distance of computed steps from the exact Poisson map."),
     "report": ("phigen.cli.report", "Write one HTML page: formulas, proofs, measurements, figures."),
-    "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),
+    "show": ("phigen.cli.show", "Show the formulas of a spec and of its step."),
     "list": ("phigen.cli.list", "List the bundled specs."),
     "schema": ("phigen.cli.schema", "Print the JSON Schema of specs, for editors."),
     "reproduce": ("phigen.cli.reproduce", "Draw the figures of the paper and print the measured numbers."),
@@ -70,7 +70,7 @@ class Commands(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
-    def main(  # type: ignore[override]  # by click's overloads, only standalone mode does not return
+    def main(  # type: ignore[override]  # click declares that main never returns in standalone mode
         self,
         args: Sequence[str] | None = None,
         prog_name: str | None = None,

@@ -73,7 +73,7 @@ def _one_of(choices: Sequence[str]) -> str:
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
     """Return the callback of an option that names a file.
 
-    The callback checks the suffix of the file and its folder before any work is done.
+    Before any work is done, the callback checks the suffix of the file, and that the file can be written.
     """
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:

@@ -49,9 +49,9 @@ def text_of(compilation: Compilation, files: Mapping[str, str], verification: Ve
 
 
 def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> str:
-    """Return the reason why a certificate on disk does not belong to these files.
+    """Return the reason why the certificate ``path`` does not belong to the generated ``files``.
 
-    The reason is "" if the certificate belongs to these files, or if there is no certificate.
+    The reason is "" if the certificate belongs to ``files``, or if there is no certificate.
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from phigen.spec.model import Spec
 
 #: Half-width of the default interval of a coordinate, as a fraction of its initial value. If the initial value is
-#: smaller than 1 in magnitude, the half-width is this number itself.
+#: smaller than 1 in magnitude, the half-width is `WIDTH` itself.
 WIDTH = 0.01
 
 

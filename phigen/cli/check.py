@@ -33,7 +33,7 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 @many_specs
 @order_option
 @scheme_option
-@click.option("--independent", is_flag=True, help="Derive the S_i, α and β a second time, by sympy, and compare.")
+@click.option("--independent", is_flag=True, help="Derive the terms S_i and the maps α, β a second time, by sympy.")
 @click.option(
     "--terms",
     metavar="K",
@@ -61,14 +61,14 @@ def command(
 ) -> None:
     """Prove the mathematics of specs, or refute it.
 
-    The statements: π is skew and satisfies the Jacobi identity; Casimirs and invariants are conserved; α and β satisfy
-    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting solves its
-    equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points. Exit code 5
-    if any statement is refuted. With -q only statements that do not hold are printed. With -v all triples of
-    coordinates that violate the Jacobi identity are printed.
+    The statements: π is skew and satisfies the Jacobi identity; Casimirs and invariants are conserved; for a series,
+    the maps α and β satisfy the axioms of a bi-realisation, and the terms S_1 … S_k solve the Hamilton–Jacobi equation;
+    for a splitting, each flow solves its equation. Each statement is proved in exact arithmetic, refuted with a
+    residual, or checked at points. Exit code 5 if any statement is refuted. With -q only statements that do not hold
+    are printed. With -v all triples of coordinates that violate the Jacobi identity are printed.
 
-    With --independent sympy derives the S_i a second time, by another method, and checks α and β. Results are printed
-    term by term. Exit code 3 if the time limit is reached.
+    With --independent sympy derives the terms S_i a second time, by another method, and checks α and β. Results are
+    printed term by term. Exit code 3 if the time limit is reached.
     """
     from phigen.compiler import examine
 

@@ -174,7 +174,9 @@ def out_document(text: str) -> None:
 
 @contextmanager
 def _stdout() -> Iterator[None]:
-    """Context in which an error of writing has stdout as the name of the file. A broken pipe is not changed."""
+    """Context in which an error of writing has stdout as the name of the file. A `BrokenPipeError` is raised
+    unchanged.
+    """
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
     try:
@@ -186,7 +188,7 @@ def _stdout() -> Iterator[None]:
 
 
 def _colour() -> bool | None:
-    """Return False if NO_COLOR is set (https://no-color.org), which means no colour, else None.
+    """Return False, for no colour, if NO_COLOR is set (see https://no-color.org). Otherwise return None.
 
     For None, click decides: it uses colour on terminals only.
     """

@@ -1,4 +1,4 @@
-"""``phigen demo``: the Lotka–Volterra system of the paper (arXiv:2303.15883), until shortly before its singularity."""
+"""``phigen demo``: the Lotka–Volterra system of the paper (arXiv:2303.15883), until shortly before a singularity."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _ROWS_AT = (0.1, 0.2, 0.24, 0.25, 0.254, 0.255)
 @verbosity
 @pass_console
 def command(console: Console, target: str) -> None:
-    """Compile the paper's Lotka–Volterra system, run it until shortly before its singularity, and print its
-    errors.
+    """Compile the paper's Lotka–Volterra system, run it until shortly before the singularity of the solution, and print
+    the errors of the solvers.
 
     The solution has a closed form and becomes infinite in finite time. The table compares two solvers of phigen with
     RK2, with the same step. It lists their distances from the closed form, and their errors of the Casimir.

@@ -115,7 +115,7 @@ def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float],
     """Return the listed times in order, without the start and without times outside the run.
 
     If the times come from the command line (``asked``), times outside the run raise `click.BadParameter`. But if
-    ``stop`` has ended the run early, times after its end are only left out.
+    ``stop`` has ended the run early, times after the end of the run are left out without an error.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     too_late = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]

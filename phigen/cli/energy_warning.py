@@ -22,8 +22,8 @@ LEAST_COMPARED_ERROR = 1e-3
 #: Runs with more steps than this are not compared with RK4, because the comparison would take long. In long runs RK4 is
 #: seldom better anyway, since its energy error grows with time.
 MOST_STEPS = 1_000_000
-#: The warning about RK4 appears if its error is smaller by more than this factor. A smaller advantage may be an
-#: accident, since measured times vary.
+#: The warning about RK4 appears if the energy error of RK4 is smaller than that of the solver by more than this factor.
+#: A smaller advantage may be an accident, since measured times vary.
 LEAST_RK4_ADVANTAGE = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}

@@ -81,7 +81,7 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
 def wrote(path: Path) -> str:
     """Return the message that a file was written, or that it replaced an existing file.
 
-    If a run continues its own file, by --resume or --extend, the message says "wrote".
+    With --resume or --extend, a run is continued in its existing file, and the message says "wrote".
     """
     ctx: Any = click.get_current_context()
     continued = ctx.params.get("resume") or ctx.params.get("extend")

@@ -87,7 +87,8 @@ def report(error: BaseException, console: Console) -> int:
 def drop_unprinted() -> None:
     """Discard output that stdout and stderr did not accept.
 
-    The failure was reported already. Otherwise Python would report it again at exit, and end with exit code 120.
+    The failure was reported already. If the output were not discarded, Python would report the failure again at exit,
+    and end with exit code 120.
     """
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -101,7 +102,8 @@ def drop_unprinted() -> None:
 def _place(error: OSError) -> str:
     """Return the name of the file in an OSError.
 
-    If there is no name, the result is "the working directory" if this folder was removed, else "".
+    For an error without a name, the result is "the working directory" if the working directory was removed. Otherwise
+    the result is "".
     """
     if error.filename is not None:
         return os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)

@@ -66,7 +66,7 @@ class Options:
         return compilation if self.stack is None else self._measured(compilation, self.stack)
 
     def _with_changeable_parameters(self, compilation: Compilation) -> Compilation:
-        """Return the compilation, with a function in the C that changes parameters. Bindings call this function."""
+        """Return the compilation, with one more function in its C. Bindings call this function to change parameters."""
         spec, part = compilation.spec, "parameters"
         if part in spec.extras.without and spec.parameters and not spec.lattice:
             message = f"--binding {self.bindings[0]} needs {spec.name}_set_parameters, which `without` leaves out"

@@ -36,7 +36,7 @@ class LatticeExperiment(Experiment):
     """Run of a lattice, changed by options of the command line.
 
     ``start`` has the initial state and the parameters. ``past`` has the rows of a finished run that this run continues
-    (`phigen.runtime.lattice_rows.Past`). ``origin`` is a text on provenance for output files.
+    (`phigen.runtime.lattice_rows.Past`). ``origin`` is a text that says from which run an output file comes.
     """
 
     start: Start | None = None

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def command(name: str | None, as_json: bool) -> None:
     """List the bundled specs: name, dimension, kind of π, title.
 
-    Commands accept these names: phigen run kepler. To copy one as a start: cp "$(phigen list --path kepler)" .
+    Commands accept these names: phigen run kepler. To copy a spec as a start: cp "$(phigen list --path kepler)" .
     """
     from phigen import resources, spec
 

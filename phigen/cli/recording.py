@@ -254,9 +254,10 @@ class Recorder:
         self._saved = time.monotonic()
 
     def means(self) -> dict[str, tuple[float, float]]:
-        """Return the mean and the standard error of each coordinate and of the energy over all members.
+        """Return the mean and the standard error of each coordinate and of the energy, taken over all members at the
+        end of the run.
 
-        The time is that of the end of the run. The first member is the trajectory of the session. Raises `StepError`.
+        The first member is the trajectory of the session. Raises `StepError`.
         """
         experiment, names = self.experiment, self.solver.interface
         run, parameters, steps = experiment.run, experiment.parameters, experiment.made + self.steps

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
 
-#: Largest number of steps that the viewer of the page shows without gaps. The states after all of these first steps are
-#: stored.
+#: The viewer of the page can show the beginning of a run without gaps. For this, the state after each step is stored,
+#: up to this number of steps.
 _OPENING = 4_000
 
 

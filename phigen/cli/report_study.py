@@ -104,7 +104,7 @@ def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> C
 
 
 def environment() -> dict[str, str]:
-    """Return the properties of the machine on which measured times depend, by name."""
+    """Return those properties of the machine that influence measured times, by name."""
     import platform
 
     from phigen.runtime import toolchain

@@ -56,7 +56,9 @@ def command(
     as_latex: bool,
     as_json: bool,
 ) -> None:
-    """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts.
+    """Show the formulas of a spec: π, Casimirs, the step, the modified Hamiltonian, operation counts.
+
+    For a series, the formulas of the step are the maps α and β of the bi-realisation, and the terms S_1 … S_k.
 
     For a lattice the formulas are those of one site. --expand prints a small lattice as an ordinary spec, with one
     coordinate for each field of each site.

@@ -219,7 +219,7 @@ def _of_lattice(
 
 
 def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """Return a first estimate of the step size, the length of time to integrate, and the sign of the step.
+    """Return three numbers: an initial step size, the length of time to integrate, and the sign of the step.
 
     The length is ``horizon``, by default that of the run.
     """

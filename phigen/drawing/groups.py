@@ -11,10 +11,11 @@ Group = tuple[str, ...]
 def groups(coordinates: Sequence[str]) -> list[Group]:
     """Return the coordinates in groups of up to three, in order. A group of one coordinate is drawn over time.
 
-    Up to three coordinates are one group. Otherwise each position is paired with its momentum, by names such as q and
-    p, q1 and p1, x and px. If there are exactly two pairs, the two positions form one group, which shows the orbit in a
-    plane. The two momenta then form another group. If not all coordinates belong to pairs, successive names form a
-    group if they have the same letters, or if they have the same number.
+    Up to three coordinates are one group. If there are more, each position is paired with its momentum, by names such
+    as q and p, q1 and p1, x and px. If all coordinates belong to pairs, each pair is a group. But if there are exactly
+    two pairs, the two positions form one group, which shows the orbit in a plane, and the two momenta form the other
+    group. If some coordinates belong to no pair, successive names form a group if they have the same letters, or if
+    they have the same number. Long groups are split.
     """
     names = tuple(coordinates)
     if len(names) <= 3:

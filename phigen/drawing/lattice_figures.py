@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 #: MOST_PANELS: largest number of coordinates that get a panel. MOST_TIMES: largest number of times in a diagram.
 #: SNAPSHOTS: number of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Graphs with more sites are not drawn with their bonds. A graph is drawn at several times, so figures of larger graphs
-#: would be too large as files.
+#: Graphs with more sites than this are not drawn with their bonds. A graph is drawn at several times, so figures of
+#: larger graphs would be too large as files.
 MOST_DRAWN = 100
 #: Number of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48

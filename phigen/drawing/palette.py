@@ -20,8 +20,9 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 #: Colours by their roles. SVG files contain the colours literally, and a page replaces each by a variable of its style
-#: sheet; therefore no two colours are equal. The colours of series have a contrast of at least 3 to white and to black.
-#: Readers with every kind of colour vision can distinguish them (Okabe and Ito, with the light colours darkened).
+#: sheet; therefore no two colours are equal. The colours of curves (``series-1``, …) have a contrast of at least 3 to
+#: white and to black. Readers with every kind of colour vision can distinguish them (Okabe and Ito, with the light
+#: colours darkened).
 PALETTE: Mapping[str, str] = {
     "paper": "#ffffff",
     "ink": "#24292f",

@@ -146,7 +146,8 @@ def _draw_faded(
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
-        # A band also contains the point that follows its last point, since otherwise there would be gaps between bands.
+        # The curve in a band is drawn up to the next point, which lies in another band. Otherwise there would be gaps
+        # between bands.
         in_band = band == level
         band_rows = in_band | np.r_[False, in_band[:-1]] if as_curve else in_band
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)

@@ -20,7 +20,7 @@ _CONSTANT = 1e-8
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
-    They are a pair of conjugate coordinates that both vary, if there is one.
+    If a coordinate and its momentum both vary, the first such pair is drawn.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)

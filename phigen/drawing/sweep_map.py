@@ -107,8 +107,8 @@ def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors
 
     Observables are drawn as curves over one dimension. If there is a second dimension with few values, there is a curve
     for each value. If members differ in their random numbers (dimension ``seed``), the means over these members are
-    drawn with their standard errors. Other variables over two dimensions are drawn as maps, and so are observables that
-    would need more curves. If there are more than two dimensions, the median over the others is drawn. The note
+    drawn with their standard errors. Other variables over two dimensions are drawn as maps. So are observables if both
+    dimensions have many values. If there are more than two dimensions, the median over the others is drawn. The note
     explains the error bars, and names the dimensions over which means or medians were taken.
     """
     note = " ± standard error" if errors is not None else ""

@@ -151,7 +151,9 @@ def _attitude(program: Program) -> Iterator[Variable]:
 
 
 def _position(program: Program) -> Iterator[Variable]:
-    """Yield the variables for the position of a body, if the system has one; its initial value is 0."""
+    """Yield the variables for the position of the body in space, if the solver computes it. The initial
+    position is 0.
+    """
     if program.attitude and program.attitude.group.translation:
         for name in POSITION:
             yield Variable(f"position.{name}", "output", "continuous", 0.0, "position of the body in space")

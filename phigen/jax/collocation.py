@@ -33,7 +33,8 @@ GRADIENT = "gradient"
 #: Largest number of sweeps (fixed-point iterations) for a step or for a linear equation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds, in double precision, that end two iterations: the sweeps of a step, and the sweeps for a linear equation.
+#: Thresholds at which two iterations end: the sweeps of a step, and the sweeps that solve a linear equation. The values
+#: are those for double precision.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
 #: Data of a run between two steps: the state x, the compensation term of x, and increments that predict the next step.

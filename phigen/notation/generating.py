@@ -1,4 +1,6 @@
-"""Formulas of a method by series, for display: S_1 … S_k, the order with its reason, the modified Hamiltonian."""
+"""Formulas of a method by series, for display: the terms S_1 … S_k, the order with its reason, the modified
+Hamiltonian.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formulas of a method by series in sympy: H minus multiples of Casimirs, α, β and S_1 … S_k."""
+"""Formulas of a method by series in sympy: H minus multiples of Casimirs, the maps α and β, the terms S_1 … S_k."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def printed_map(state: Floats, h: float) -> Floats:
 
 
 def printed_field(state: Floats) -> Floats:
-    """Return the vector field that the paper prints for this system, at one state (3,)."""
+    """Return the vector field that the paper prints for the system `SPEC`, at one state (3,)."""
     x, y, z = state
     u, v = x - y + z, x + y - z
     return np.array([-v / 8 * (v**2 + v**2), (z - y) / 4 * (u**2 + v**2), u / 8 * (u**2 + v**2)])
@@ -58,7 +58,7 @@ def _rows(state: Floats, h: float, steps: int, stride: int) -> Floats:
 
 
 def leaf_change_plate() -> Plate:
-    """Return the figure of orbits under both maps in space, and of the value of the Casimir along them."""
+    """Return the figure of two orbits, by the map of the paper and by phigen, and of the Casimir along each orbit."""
     compilation, solver = compiled(SPEC, 4)
     steps = round(TURNS * PERIOD / STEP)
     trajectory = solver.integrate(START, STEP, steps)

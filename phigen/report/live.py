@@ -272,8 +272,9 @@ def _groups(system: System) -> list[Group]:
 def _leaf(system: System, group: Group) -> int | None:
     """Return the index of the Casimir whose level surface is drawn; None if no surface is drawn.
 
-    The group has three coordinates, and the Casimir depends on these coordinates only. If the system has two
-    coordinates, the level curve of the energy is drawn instead, and the result is −1.
+    A surface is drawn if the group has three coordinates, and a conserved Casimir depends on these coordinates only. If
+    the system has only two coordinates and conserves its energy, the level curve of the energy is drawn instead, and
+    the result is −1.
     """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None

@@ -1,4 +1,4 @@
-"""Live panel of a lattice, which shows the fields of its sites. The generated JavaScript and RK4 advance them."""
+"""Live panel of a lattice. It shows the fields of the sites, which the generated JavaScript and RK4 advance in time."""
 
 from __future__ import annotations
 

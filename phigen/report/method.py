@@ -1,4 +1,4 @@
-"""Section on the method: α, β and S_1 … S_k of a series, or the flows of a splitting."""
+"""Section on the method: for a series, the maps α and β and the terms S_1 … S_k; for a splitting, the flows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MOD
 from phigen.scheme.steps import Step
 from phigen.splitting.flow import Flow
 
-#: Number of flows above which the list of a step is folded.
+#: If a step has more flows than this, the table of its flows is folded.
 FLOWS = 12
 
 

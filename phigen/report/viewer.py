@@ -69,8 +69,8 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Return lines on the level set of a Casimir on which the trajectory stays; None if there is no such surface or
-    curve.
+    """Return lines that show the symplectic leaf: the surface on which a Casimir has the same value as on the
+    trajectory. Return None if no surface can be drawn.
 
     The result (points, 3) has the coordinates on the three ``axes``. Rows of NaN separate the lines.
     """

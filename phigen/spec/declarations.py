@@ -154,7 +154,7 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return the names that functions on phase space may use, and densities of sites too. The time is not
+        """Return the names that are allowed in functions on phase space, and in densities of sites. The time is not
         allowed.
 
         ``extra`` has further names with their expressions.

@@ -382,8 +382,8 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for words that users may write as keys of a run. The setting belongs to the whole spec or to a call in Python,
-#: or the key has another name.
+#: Hints for words that users may write as keys of a run, although runs have no such keys. A hint says where the setting
+#: belongs, or which key a run has for it.
 _BESIDE_RUNS = {
     key: f"{key}: is a key of the whole spec: write it beside runs:, not in a run"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")

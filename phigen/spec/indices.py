@@ -36,8 +36,8 @@ class Indices:
     ends: tuple[str, ...] = ()
 
     def read(self, parser: Parser, token: Token) -> Expression:
-        """Read the index after a name. Return the expression of the name at the neighbour, or the end of a bond, with
-        this index.
+        """Read the index after a name. Return the expression that the name with this index stands for: its value at a
+        neighbour, or at an end of a bond.
 
         ``token`` is the name; the current token of the parser is ``[``.
         """

@@ -255,8 +255,8 @@ class ListOf(Kind):
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
-            # The keys of the mapping are read as the list. So the names are declared, and later uses of these names are
-            # not reported.
+            # The user has written a mapping in place of a list. After the error, the keys of the mapping are read as
+            # the list. So they are declared as names, and later uses of these names are not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
             is_matrix = isinstance(self.item, ListOf) and isinstance(node, MappingNode)

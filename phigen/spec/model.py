@@ -155,8 +155,8 @@ PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | N
 class BirealisationChoice:
     """The choice of a bi-realisation in a spec: its ``kind``, and options for some kinds.
 
-    ``alpha`` and ``beta`` are for the kind ``custom``. ``order`` is set if an option of a command or a call overrides
-    the order in the spec. The kind ``spray`` uses it to truncate its series.
+    ``alpha`` and ``beta`` are for the kind ``custom``. ``order`` is set if an option of a command, or a call, overrides
+    the order in the spec. The series of the kind ``spray`` are truncated according to ``order``.
     """
 
     kind: str = "auto"
@@ -487,7 +487,7 @@ class Spec:
     inputs: tuple[str, ...] = ()  # parameters that the calling program may change between steps
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
-    observables: Mapping[str, Expression] = field(default_factory=dict)  # quantities to record; no proofs
+    observables: Mapping[str, Expression] = field(default_factory=dict)  # quantities to record, without proofs
     birealisation: BirealisationChoice = BirealisationChoice()
     order: int | None = DEFAULT_ORDER  # None if the spec states terms
     terms: int | None = None

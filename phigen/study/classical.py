@@ -115,8 +115,8 @@ def pieces_of(
         whole_steps = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
         while steps_done < whole_steps:
             with np.errstate(all="ignore"):
-                # The steps are added by compensated summation, as in solvers of phigen, so that differences of results
-                # come from the methods alone.
+                # The changes of x are added by compensated summation, as in solvers of phigen. So the results of a
+                # classical method and of phigen differ by the methods alone.
                 change = (step(field, x, h) - x) + carry
                 following = x + change
                 carry = change - (following - x)

@@ -341,9 +341,9 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"DΦ π DΦᵀ differs from π∘Φ by {defect:.1e}")
-    # Finite differences are computed four times: with two displacements, each in two units. The units are typical
-    # values of the fields, and typical values at the sites. The smallest of the four deviations counts, since larger
-    # ones are errors of the differences.
+    # Finite differences are computed four times: with two spacings, each in two units. The units are the largest
+    # magnitudes of a field in the run, over all sites and at the site itself. The smallest of the four deviations from
+    # the tangent map counts, since larger deviations are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
@@ -439,8 +439,8 @@ class _SmallLattice:
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
         """Return the largest difference between the tangent map of a step and finite differences of order 6.
 
-        The difference is relative to the largest entry of the tangent map. Each number of a state is measured in its
-        entry of ``units``, and displaced by ``apart`` in this unit.
+        The difference is relative to the largest entry of the tangent map. ``units`` has a unit for each number of a
+        state. In this unit the number is measured, and displaced by ``apart``.
         """
 
         def step(y: Floats) -> Floats:

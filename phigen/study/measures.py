@@ -18,8 +18,8 @@ ROUNDING = 4e-16
 
 #: Finite differences are computed several times. The usual displacements are divided by each of these factors.
 DISTANCES = (1.0, 256.0)
-#: The tangent map is also compared with finite differences whose displacements are in proportion to each coordinate, if
-#: all other differences deviate from it by more than this fraction of its largest entry.
+#: If all finite differences deviate from the tangent map by more than this fraction of the largest entry of the map,
+#: further differences are computed. The displacement of a coordinate is then in proportion to the coordinate.
 ROUGH = 1e-8
 
 #: Relative displacement of coordinates in finite differences of π. These differences estimate the effect of rounding

@@ -159,7 +159,7 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
         state = run(end / n, n, 1)
-        # "not error < 1" is also true if the error is NaN, because the reference solution failed.
+        # If the reference solution failed, the error is NaN. Then "not error < 1" is true, too.
         if state is None or not (error := error_of(state, target)) < 1:
             continue
         states[n] = state

@@ -67,7 +67,7 @@ def differences(
 
 
 def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry ``about`` of a plan, and add the folder of the spec under the key ``folder``."""
+    """Return the entry ``about`` of a plan, with the folder of the spec as one more value ``folder``."""
     return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
 
 

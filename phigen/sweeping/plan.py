@@ -28,11 +28,11 @@ class Plan:
     """Numerical description of a sweep.
 
     ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
-    ranges of the varied quantities. An axis without a number of values has values that are drawn at random with
-    ``seed``. ``noise`` is the seed of the noise; each member has its own path of the noise. ``members`` is 0 for a
-    grid. Otherwise it is the number of random members or of the rows of a file, and the only dimension is ``member``.
-    ``listed`` names the columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice,
-    workers compute the initial state from the spec, and ``initial`` is not used.
+    ranges of the varied quantities. If an axis has the size 0, its values are drawn at random with ``seed``. ``noise``
+    is the seed of the noise; each member has its own path of the noise. ``members`` is 0 for a grid. Otherwise it is
+    the number of random members or of the rows of a file, and the only dimension is ``member``. ``listed`` names the
+    columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice, workers compute the
+    initial state from the spec, and ``initial`` is not used.
     """
 
     name: str
@@ -59,12 +59,12 @@ class Plan:
 
     @property
     def grid(self) -> tuple[Axis, ...]:
-        """The axes with a number of values, which are dimensions of the results."""
+        """The axes whose values form a grid. They are dimensions of the results."""
         return tuple(axis for axis in self.axes if axis.size)
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """The axes without a number of values. They are no dimensions: the value of each member is drawn at random."""
+        """The axes whose values are drawn at random, for each member. They are not dimensions of the results."""
         return tuple(axis for axis in self.axes if not axis.size)
 
     @property

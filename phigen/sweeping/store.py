@@ -95,7 +95,7 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash that identifies results: of the solver, and of the plan without its division into chunks."""
+    """Return a hash of the solver, and of the plan without its division into chunks."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 

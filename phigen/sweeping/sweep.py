@@ -227,7 +227,7 @@ def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str,
 def _gone_on_with(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> store.Job:
-    """Return the existing store ``output``, so that it is continued. Raises `FileError` if it contains another
+    """Open the existing store ``output``, to continue the sweep in it. Raises `FileError` if the store contains another
     sweep.
     """
     job = store.open_job(str(output))

@@ -1,4 +1,5 @@
-"""Comparison of realisations, schemes and classical methods on one run: cost, errors, and the Poisson defect.
+"""Comparison of bi-realisations, schemes and classical methods on one run: cost, errors, and the Poisson
+defect.
 
 While `phigen.tuning.study.tune` searches for the cheapest setting, a comparison measures all settings, with the same
 step size or at the same cost.
@@ -73,7 +74,8 @@ class Comparison:
     """Results of all methods on one run over the time ``horizon``.
 
     ``equal`` says what the methods have in common: ``step``, the step size, or ``work``, the processor time. ``unit``
-    is the kind of unit of energy errors, ``clock`` the variable in which steps have equal size, t or τ.
+    says to what energy errors are relative (`Unit.kind`). ``clock`` is the variable in which steps have equal size, t
+    or τ.
     """
 
     entries: tuple[ComparedMethod, ...]
@@ -175,8 +177,8 @@ def _measured(
 ) -> ComparedMethod:
     """Measure a method with a step size of about ``h`` over the whole run.
 
-    ``exact`` is the method that computes the reference solution, None if there is no reference. It may take
-    ``seconds``.
+    ``exact`` is the method that computes the reference solution, None if there is no reference. The computation of the
+    reference solution may take ``seconds``.
     """
     unmeasured = ComparedMethod(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
     if not math.isfinite(h):

@@ -45,9 +45,9 @@ from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: candidates are squares of distances
-#: to these powers, in quarters, the most promising first. OF_SPEED: further candidates are 1 + the scaled square of the
-#: speed to minus these powers, in quarters.
+#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: candidates are b^(k/4) for these k,
+#: the most promising first, where b is the square of a distance. OF_SPEED: further candidates are (1 + s)^(−k/4) for
+#: these k, where s is the scaled square of the speed.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
@@ -93,7 +93,9 @@ class Monitors:
     refused: Mapping[str, str] = field(default_factory=dict)
 
     def gain(self, trial: Trial) -> float:
-        """Return the gain of a monitor: the number of steps without a monitor, divided by that with it."""
+        """Return the gain of a monitor: the number of steps without a monitor, divided by the number with this
+        monitor.
+        """
         return self.plain.steps / trial.steps
 
 
@@ -161,7 +163,9 @@ def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
 
 
 def _bases(system: System) -> list[Expression]:
-    """Return the expressions in H that depend on coordinates, and are denominators, or under roots or in logarithms."""
+    """Return those expressions in H that depend on coordinates, and are denominators, or arguments of roots or
+    logarithms.
+    """
     by_text: dict[str, Expression] = {}
     for node in topological([system.hamiltonian]):
         rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))

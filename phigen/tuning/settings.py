@@ -167,7 +167,7 @@ def charts(system: System, current: Setting) -> list[Setting]:
     """Return the settings to measure first.
 
     They are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation that might
-    apply, at order 4. A bi-realisation that does not apply is found when it is built. Kinds that need formulas of the
+    apply, at order 4. Whether a bi-realisation applies is known only when it is built. Kinds that need formulas of the
     user are left out. If π is constant or linear, Karasev's paths are left out too, since other kinds have the same
     maps in closed form.
     """
