@@ -30,7 +30,7 @@ def display(name: str) -> Callable[..., Any]:
     """Return the function with this name in `DISPLAYS`. The function makes formulas, a table or a figure of an
     object.
 
-    It raises `MissingPackageError` if a package that it needs is missing.
+    The function raises `MissingPackageError` if a package that it needs is missing.
     """
     module, function = DISPLAYS[name]
     return cast(Callable[..., Any], getattr(import_module(module), function))

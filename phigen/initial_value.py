@@ -159,8 +159,8 @@ class _Problem:
     def offset(self) -> float:
         """The number that is added to a time of the solver to get a time of the user.
 
-        It is 0 if the Hamiltonian depends on the time. Otherwise times of the solver begin at 0, and the number is
-        ``begin``.
+        The number is 0 if the Hamiltonian depends on the time. Otherwise times of the solver begin at 0, and the number
+        is ``begin``.
         """
         return 0.0 if self.solver.interface.time else self.begin
 

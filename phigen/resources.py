@@ -60,7 +60,7 @@ def missing(source: str) -> Diagnostic:
 def suggestion(source: str) -> str:
     """Return a hint for a spec that was not found.
 
-    It names a similar spec or file, or else the command that lists the specs.
+    The hint names a similar spec or file, or else the command that lists the specs.
     """
     from difflib import get_close_matches
 

@@ -129,7 +129,7 @@ def _mode(path: Path) -> int:
     """Return the permissions of the file that is replaced or, if there is none, those that a new file would
     get.
 
-    They must be set explicitly, since mkstemp creates temporary files that only their owner can read.
+    Permissions must be set explicitly, since mkstemp creates temporary files that only their owner can read.
     """
     try:
         return path.stat().st_mode & 0o777

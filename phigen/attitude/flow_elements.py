@@ -208,8 +208,8 @@ def factor_elements(
 ) -> list[list[Expression]]:
     """Return the group elements, minus 1, of all factors of a part and then of its free rigid bodies.
 
-    They are functions of the state before the flow. ``t`` is the duration of the flow, by default the symbol of the
-    step size. Raises `SpecError` for matrices whose exponential has no closed form.
+    The group elements are functions of the state before the flow. ``t`` is the duration of the flow, by default the
+    symbol of the step size. Raises `SpecError` for matrices whose exponential has no closed form.
     """
     t, elements = t or symbol(TIME), []
     for factor in turning.factors:

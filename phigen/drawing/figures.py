@@ -141,8 +141,8 @@ def run_figure(
 ) -> Figure:
     """Return one figure with all plots of a run.
 
-    It shows the trajectory of the first method with its Poincaré sections and observables, the errors of all methods,
-    and the Lyapunov exponents if there is a ``spectrum``.
+    The figure shows the trajectory of the first method with its Poincaré sections and observables, the errors of all
+    methods, and the Lyapunov exponents if there is a ``spectrum``.
     """
     first = next(iter(methods.values()))
 

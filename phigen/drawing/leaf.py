@@ -46,8 +46,8 @@ def leaf_of(
 ) -> Leaf | None:
     """Return the leaf through the point ``start``.
 
-    It belongs to the first Casimir that depends on no coordinates except ``names``. Returns None if there is no such
-    Casimir, or if there are not three names.
+    The leaf belongs to the first Casimir that depends on no coordinates except ``names``. Returns None if there is no
+    such Casimir, or if there are not three names.
     """
     for casimir in casimirs.values():
         used_names = set(symbols_of(casimir)) & set(start)

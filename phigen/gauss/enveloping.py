@@ -356,8 +356,8 @@ class _Module:
     ) -> fmpq_mat:
         """Return the matrix of left multiplication by the central element z.
 
-        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z); see the head of the module. Here a is an element of the Lie
-        algebra, and f an element of S with ⟨a, f⟩ ≠ 0.
+        The matrix follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z); see the head of the module. Here a is an element of
+        the Lie algebra, and f an element of S with ⟨a, f⟩ ≠ 0.
         """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)

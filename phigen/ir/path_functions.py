@@ -281,8 +281,8 @@ class _LaneFunctions:
     def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
         """Return the function that computes Taylor coefficients of order k ≥ 1, for the series in ``numbers``.
 
-        It first adds the products of coefficients of orders j and k − j for 0 < j < k, then the remaining terms, which
-        may contain coefficients of order k.
+        The function first adds the products of coefficients of orders j and k − j for 0 < j < k, then the remaining
+        terms, which may contain coefficients of order k.
         """
         layout, between, ends = self.path.layout, list[ir.Statement](), list[ir.Statement]()
         series = [(i, self.path.path.series[i]) for i in numbers]

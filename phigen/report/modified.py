@@ -14,7 +14,7 @@ from phigen.study.backward import Constancy, truncation
 def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
     """Return the section on the modified Hamiltonian.
 
-    It shows the measured changes as a table and a figure, or the reason why they were not measured.
+    The section shows the measured changes as a table and a figure, or the reason why they were not measured.
     """
     explanation = (
         "A step of the solver agrees to all orders in h with the exact flow, over the time h, of a Hamiltonian H̃ near "

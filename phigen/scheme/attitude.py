@@ -1,8 +1,8 @@
 """Kernels of the attitude of a body.
 
-They compute the group element by which a step rotates the body: from the covector p = ∇S_h(y) of the step, or from the
-flows of a splitting. If the gauge subtracts Casimirs from H, a further kernel computes the rotation that these Casimirs
-contribute.
+The kernels compute the group element by which a step rotates the body: from the covector p = ∇S_h(y) of the step, or
+from the flows of a splitting. If the gauge subtracts Casimirs from H, a further kernel computes the rotation that these
+Casimirs contribute.
 """
 
 from __future__ import annotations
@@ -144,8 +144,8 @@ def flow_attitude(
 ) -> Attitude:
     """Return the attitude of a splitting.
 
-    It has one kernel for each flow, which computes the increments of the flow and the group element of the step up to
-    the end of this flow. ``increments`` has first the increments of the flows of the noise sources, then those of
+    The result has one kernel for each flow, which computes the increments of the flow and the group element of the step
+    up to the end of this flow. ``increments`` has first the increments of the flows of the noise sources, then those of
     ``flows``. With a monitor, ``time_of`` returns the physical time of a flow. The coefficients of the kernels are
     added to ``coefficients``. Raises the errors of `turnings`.
     """

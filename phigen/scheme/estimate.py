@@ -83,9 +83,9 @@ class TooManyError(Exception):
 class OperationCount:
     """Counter of the operations in products of matrices.
 
-    It counts sums of several terms as `phigen.symbolic.expression.total_at` adds them, in pairs. Sub-expressions that
-    contain only symbols for which ``is_fixed`` is true are not counted, since they are computed once before the steps.
-    Raises `TooManyError` as soon as the number of operations exceeds the limit.
+    The counter counts sums of several terms as `phigen.symbolic.expression.total_at` adds them, in pairs.
+    Sub-expressions that contain only symbols for which ``is_fixed`` is true are not counted, since they are computed
+    once before the steps. Raises `TooManyError` as soon as the number of operations exceeds the limit.
     """
 
     def __init__(self, limit: int, is_fixed: Callable[[str], bool]) -> None:

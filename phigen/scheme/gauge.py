@@ -102,7 +102,7 @@ class Gauge:
     def pace(self, system: System) -> Expression:
         """Return the factor that multiplies ∇H + ζ in the system that is discretised, where ζ is the covector force.
 
-        It is g if there are a monitor g and forces, else 1.
+        The factor is g if there are a monitor g and forces, else 1.
         """
         return self.monitor if self.monitor and system.forces else ONE
 

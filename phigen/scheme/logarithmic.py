@@ -120,8 +120,8 @@ def composition_of(requested: str, order: int) -> str:
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
     """Whether the expression ``e``, a part of H, is negative.
 
-    It is negative if its form proves this, or else if its values at the starts of all runs are negative. If the spec
-    has no runs, it also counts as negative if its form proves that it is never positive.
+    The expression is negative if its form proves this, or else if its values at the starts of all runs are negative. If
+    the spec has no runs, it also counts as negative if its form proves that it is never positive.
     """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):

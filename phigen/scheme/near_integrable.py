@@ -145,7 +145,7 @@ def _quadrature(stages: int) -> NearIntegrable:
 def _weight(nodes: list[Fraction], i: int) -> Fraction:
     """Return the weight of node i in the quadrature over [0, 1] with these nodes.
 
-    It is the integral of the polynomial that is 1 at node i and 0 at the other nodes.
+    The weight is the integral of the polynomial that is 1 at node i and 0 at the other nodes.
     """
     p = [Fraction(1)]
     for c in (c for j, c in enumerate(nodes) if j != i):

@@ -104,7 +104,7 @@ def build_path(system: System, coefficients: Coefficients) -> Recurrences:
 def build_slopes(system: System, coefficients: Coefficients, variables: Sequence[str] = ()) -> PathSlopes:
     """Return the recurrences for the derivatives of the path ṁ = π(m)p with respect to its start and to p.
 
-    They also give the derivatives with respect to the coefficients named in ``variables``.
+    The recurrences also give the derivatives with respect to the coefficients named in ``variables``.
     """
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]

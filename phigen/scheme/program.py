@@ -163,7 +163,7 @@ class Attitude:
     def lengthened(self) -> bool:
         """Whether the quaternion of a step must be normalised.
 
-        It must be in splittings, where the elements of flows may have any length.
+        This is necessary in splittings, where the elements of flows may have any length.
         """
         return bool(self.turns) and self.quaternion
 

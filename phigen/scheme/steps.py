@@ -45,7 +45,7 @@ class PathAdjoint:
 class Adjoint:
     """The transpose of a step, for gradients.
 
-    It consists of the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of
+    The adjoint consists of the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of
     ``refresh``, and of the ``path`` that the step follows, if any.
     """
 
@@ -706,11 +706,11 @@ class Equation:
 class RelativeSites:
     """The relative coordinates in which the steps of a lattice of attracting bodies are made.
 
-    They are Jacobi coordinates if ``jacobi``, else democratic heliocentric ones. The fields are positions and momenta
-    if ``momenta``, else positions and velocities. ``axes`` pairs the index of each position with that of its momentum
-    or velocity. ``remainder`` is the index of the part B of H = A + B. The forces of B are sums over pairs. The last
-    sums read velocities, and ``shifts`` is their number; all others read positions. ``mass`` is the name of the
-    parameter at sites.
+    The coordinates are Jacobi coordinates if ``jacobi``, else democratic heliocentric ones. The fields are positions
+    and momenta if ``momenta``, else positions and velocities. ``axes`` pairs the index of each position with that of
+    its momentum or velocity. ``remainder`` is the index of the part B of H = A + B. The forces of B are sums over
+    pairs. The last sums read velocities, and ``shifts`` is their number; all others read positions. ``mass`` is the
+    name of the parameter at sites.
     """
 
     jacobi: bool

@@ -53,7 +53,7 @@ class Spectrum:
     def total(self) -> float:
         """Sum of all exponents, the growth rate of the volume of phase space.
 
-        It is 0 if π is constant, or if the Poisson structure is unimodular (has an invariant volume).
+        The sum is 0 if π is constant, or if the Poisson structure is unimodular (has an invariant volume).
         """
         return float(np.sum(self.exponents))
 
@@ -61,7 +61,8 @@ class Spectrum:
     def pairing(self) -> float:
         """Largest |λ_i + λ_{n+1−i}| of the exponents λ_1 ≥ … ≥ λ_n.
 
-        It is 0 for a symplectic map, and for a Poisson map too, since Casimirs contribute zeros to the exponents.
+        The value is 0 for a symplectic map, and for a Poisson map too, since Casimirs contribute zeros to the
+        exponents.
         """
         return float(np.max(np.abs(self.exponents + self.exponents[::-1])))
 

@@ -103,8 +103,8 @@ def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
 def solver_data(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
     """Return the description of a solver that a store contains, as data for JSON.
 
-    It consists of the interface, the generated files, the NumPy module of functions of states, and the text of the
-    spec.
+    The description consists of the interface, the generated files, the NumPy module of functions of states, and the
+    text of the spec.
     """
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]

@@ -13,8 +13,8 @@ from phigen.scheme.step_kinds import STEP_KINDS, StepKind
 class Feature:
     """Switch that turns parts of the runtime on or off.
 
-    It is on if three conditions hold: ``when`` is true for the program, all switches in ``requires`` are on, and the
-    user has not excluded ``part`` from the generated code.
+    The switch is on if three conditions hold: ``when`` is true for the program, all switches in ``requires`` are on,
+    and the user has not excluded ``part`` from the generated code.
     """
 
     name: str

@@ -122,7 +122,7 @@ class SystemProblem(Problem):
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
         """Return the classical methods ``names``, in C if there is a compiler, else in Python.
 
-        They start from the content of the array ``state``, which may change between runs.
+        The methods start from the content of the array ``state``, which may change between runs.
         """
         target = chosen_target("auto")
         if target == "c":

@@ -197,7 +197,7 @@ def scan(
 def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
     """Whether a scan with these points is complete, so that smaller steps need not be measured.
 
-    It is complete if the accuracy is reached and smaller steps cost more, or if only rounding errors are left.
+    A scan is complete if the accuracy is reached and smaller steps cost more, or if only rounding errors are left.
     """
     last = points[-1]
     costs = [p.cost for p in points if p.error <= accuracy]

@@ -166,10 +166,10 @@ def own_setting(compilation: Compilation) -> Setting:
 def charts(system: System, current: Setting) -> list[Setting]:
     """Return the settings to measure first.
 
-    They are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation that might
-    apply, at order 4. Whether a bi-realisation applies is known only when it is built. Kinds that need formulas of the
-    user are left out. If π is constant or linear, Karasev's paths are left out too, since other kinds have the same
-    maps in closed form.
+    The settings are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation
+    that might apply, at order 4. Whether a bi-realisation applies is known only when it is built. Kinds that need
+    formulas of the user are left out. If π is constant or linear, Karasev's paths are left out too, since other kinds
+    have the same maps in closed form.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]

@@ -96,7 +96,7 @@ class Tuning:
     def automatic_ratio(self) -> float:
         """Cost of the best method with the scheme that ``scheme: auto`` chooses, relative to the least cost.
 
-        It is infinite if no method with this scheme reaches the accuracy.
+        The ratio is infinite if no method with this scheme reaches the accuracy.
         """
         costs = [c.cost(self.accuracy) for c in self.curves if c.setting and c.setting.scheme == self.automatic]
         best = min((c.cost(self.accuracy) for c in self.curves if c.setting), default=math.inf)

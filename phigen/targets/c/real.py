@@ -167,7 +167,7 @@ def rendered(program: Program, template: str, values: Mapping[str, object]) -> s
 def threshold(value: float) -> float:
     """Return the threshold for single precision that corresponds to ``value`` in double precision.
 
-    It is ``value`` to the power 24/53, since float has 24 binary digits and double has 53.
+    The threshold is ``value`` to the power 24/53, since float has 24 binary digits and double has 53.
     """
     return float(f"{value**DIGITS:.0e}")
 

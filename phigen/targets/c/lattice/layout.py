@@ -75,7 +75,7 @@ class Layout(RowLayout):
     def sums_up(self) -> bool:
         """Whether observables compute sums over bonds in inner loops of their own.
 
-        They do so on graphs if no stage needs the sums. The sums are then not stored for all sites.
+        This is so on graphs if no stage needs the sums. The sums are then not stored for all sites.
         """
         return self.graph and self.step.equation is None
 

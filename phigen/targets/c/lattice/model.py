@@ -304,7 +304,7 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
 def _moments(step: Sweeps) -> list[float]:
     """Return the times at which coefficients that depend on the time are evaluated, one for each row of coefficients.
 
-    They are in units of the step, from the start of the step.
+    The times are in units of the step, from the start of the step.
     """
     return _by_flow(step, step.schedule.moments, 0.0)
 
