@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c2f35e44b096bb247cf222da3e7676240f42a0a71a234d630e63d62346466d80
+ * body-sha256: b7c687ecf90ac9696682387cc14418b099b9dc8642cda4c6ffb4d0b810b54615
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -15,7 +15,7 @@ extern "C" {
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 enum { duffing_COEFFICIENTS = 33 }; /* number of coefficients: functions of params and h, and of the time */
-enum { duffing_DIFFERENCES = 9 };   /* differences in the predictor; more would amplify rounding */
+enum { duffing_DIFFERENCES = 9 };   /* entries of the predictor; more would amplify rounding errors */
 
 typedef struct {
     double A;     /* amplitude of the drive */
@@ -32,7 +32,7 @@ typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing
     duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status); /* the meaning of a status */
 
-/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
+/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     double difference[duffing_DIFFERENCES][duffing_DIM]; /* the last solution, then its differences */
@@ -74,11 +74,11 @@ duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM])
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* duffing_ensemble from the time t0 on; duffing_ensemble starts at the time 0. */
+/* As duffing_ensemble, from the time t0 on; duffing_ensemble starts at the time 0. */
 duffing_status duffing_ensemble_at(const duffing_params *params, double *x, size_t members, double t0,
     double h, size_t steps, unsigned char *status);
 

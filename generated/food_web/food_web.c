@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: fb2724e5a511a122c65a02303d594a96370db8372382f566a65b9ae0fe3a9527
+ * body-sha256: 18934e6172bf9b07dcb17b03369938f4d98ae6b61d581ca951f7d6ebbddda235
  */
 #include "food_web.h"
 #include <limits.h>
@@ -34,7 +34,8 @@ static const size_t food_web_least[food_web_AXES] = { 1 };
 /* For each part of H, 1 if its flow is made of one flow for each colour of sites, else 0. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
-/* Return the part of H, counted from 1, of a flow; *flow becomes the colour of the sites that it updates. */
+/* Return the part of H, counted from 1, to which flow number *flow of a stage belongs. *flow becomes the
+   colour of the sites whose terms of H generate this flow. */
 static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;
@@ -78,7 +79,7 @@ typedef struct {
     const food_web_solver *s;
     double *const *x;   /* fields and parameters, as in food_web_solver */
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
-    int chosen;         /* the colour of the sites that a sweep updates */
+    int chosen;         /* the flow is that of the terms of H at sites of this colour */
 } food_web_row;
 
 /* Stands before loops over sites: it tells the compiler that their iterations are independent. */
@@ -113,15 +114,15 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
     return row;
 }
 
-enum { food_web_PIECE = 256 }; /* sites of a work item, for any number of threads */
+enum { food_web_PIECE = 256 }; /* number of sites in a segment of the row */
 
-/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
+/* Number of segments of the row. The last one also has the sites that are left over: no segment is short. */
 static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
 }
 
-/* Segment number `unit` of the row, a work item of threads. */
+/* Segment number `unit` of the row: the work item of a thread. */
 static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t unit)
 {
     food_web_row row = food_web_row_of(s);
@@ -157,7 +158,7 @@ static inline double food_web_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
+/* exp(u) - 1 for vectorised loops. NaN for |u| > 700. */
 static inline double food_web_expm1_lane(double u)
 {
     double power;
@@ -165,7 +166,7 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* Contributions of all other sites b to the forces of H_1 at a site a. */
+/* For each site a, the sum of the forces of H_1 by its neighbours b, for bonds that begin at a. */
 static inline void food_web_gather1(const double *coef, const food_web_row *row, double *const *at_bonds,
     double sign)
 {
@@ -196,7 +197,7 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row)
     }
 }
 
-/* A flow of the step, chosen by its number. */
+/* Flow number `flow` of a stage. */
 static void food_web_sweep_colour(const food_web_solver *s, int flow, const double *coef)
 {
     food_web_part_of_flow(s, &flow);
@@ -312,7 +313,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
-#define food_web_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
+#define food_web_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
 
 enum { food_web_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
@@ -442,7 +443,8 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 /* ---- The flows ---- */
 enum { food_web_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flows of a step that has one for each colour: 0 first, 1 inner, 2 last, 3 inner in reverse. */
+/* Apply flows of a stage, which has one for each colour. kind: 0 the first, 1 all inner ones, 2 the last, 3
+   all inner ones in reverse order. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
@@ -451,14 +453,15 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply flow `number` of a step; food_web_FLOWS means the last flow merged with the first one. */
+/* Apply flow `number` of step `steps`, from 0 on; food_web_FLOWS is the last flow merged with the first
+   one. */
 static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;
     food_web_sweep_part(s, food_web_flow_parts[number], s->coef + number * food_web_ROW);
 }
 
-/* Make steps without the last flow, which the next step includes. For 0 steps, make only the last flow. */
+/* Make steps except the very last flow, which the next step includes. For 0 steps, make only this flow. */
 static void food_web_steps(const food_web_solver *s, size_t steps)
 {
     if (steps == 0) food_web_apply_flow(s, s->steps - 1, food_web_FLOWS - 1);
@@ -500,7 +503,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    /* if s->open, continue before the last flow, which is merged with the next one */
+    /* if s->open, continue from the state before the last flow; the next flow includes it */
     food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* makes the last flow; s->before stays without it */
@@ -570,7 +573,7 @@ void food_web_vector_field(const food_web_solver *s, double *out)
 
 const char *food_web_status_string(food_web_status status)
 {
-    switch (status) { /* a table would be data that the loader has to relocate */
+    switch (status) { /* a table of pointers would need relocation when the library is loaded */
     case food_web_OK: return "ok";
     case food_web_NO_CONVERGENCE: return "no convergence: the step is too large";
     case food_web_SINGULAR: return "singular Newton matrix: the step is too large";

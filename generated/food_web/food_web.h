@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b1dc727931af1d3c4fd50b31fbc096d10843d77de4a9e61068f91e7cd92982cf
+ * body-sha256: 561dc165ebf2e7763e23b17af8320cd3b54251eeb0749c400382c75b3c03ef33
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -9,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define food_web_AXES 1 /* i */
+#define food_web_AXES 1 /* axes: i */
 #define food_web_DIM 1  /* fields of a site: x */
 #define food_web_ORDER 4
 #define food_web_CASIMIRS 0
@@ -17,8 +17,8 @@ extern "C" {
 #define food_web_SPEC_SHA256 "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
 
 typedef struct {
-    const double *A; /* at bonds: strength of the interaction; NULL for the default at all of them */
-    const double *k; /* at sites: equilibrium; NULL for the default at all of them */
+    const double *A; /* at bonds: strength of the interaction; NULL for the default everywhere */
+    const double *k; /* at sites: equilibrium; NULL for the default everywhere */
 } food_web_params;
 
 extern const food_web_params food_web_default_params;
@@ -39,15 +39,16 @@ typedef struct {
     size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
     double *x[food_web_ARRAYS]; /* the values of fields, then of parameters at sites */
-    double *before[food_web_DIM]; /* copies of the fields, which replace them if a step fails */
+    double *before[food_web_DIM]; /* copies of the fields, to restore them if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    int *bonds, *middle; /* indices in `other` of the first bond that starts, and ends, at each site */
+    /* for each site, the index in `other` of the first bond that starts, and that ends, there */
+    int *bonds, *middle;
     int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */
@@ -64,7 +65,8 @@ typedef struct {
     const size_t *ends;
 } food_web_bonds;
 
-/* Bytes that food_web_init needs for these sizes and this number of bonds; 0 if there are too many. */
+/* Number of bytes that food_web_init needs for these sizes and this number of bonds; 0 if they are not
+   admissible. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,
@@ -76,7 +78,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 
@@ -84,7 +86,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 void food_web_state(const food_web_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range and
-   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
+   x[array][site], and returns the number of arrays: at most food_web_DIM, or 3 food_web_DIM with compensated
    steps. To restore, call food_web_init, then food_web_resume with these values. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,

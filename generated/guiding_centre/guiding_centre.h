@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3f5a502e3382713a3305e8417fba0b2826a52bf3352a5650b2e937dcc0895637
+ * body-sha256: 913829409b5a491a0be3ff3cef9db5300264e0d913fd8524dc30154cf2344d67
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -16,7 +16,7 @@ extern "C" {
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 enum { guiding_centre_STAGES = 5 };       /* number of stages of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
-enum { guiding_centre_DIFFERENCES = 9 };  /* differences in the predictor; more would amplify rounding */
+enum { guiding_centre_DIFFERENCES = 9 };  /* entries of the predictor; more would amplify rounding errors */
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */
@@ -34,7 +34,7 @@ typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_cen
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status); /* the meaning of a status */
 
-/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
+/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -75,7 +75,7 @@ guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const d
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

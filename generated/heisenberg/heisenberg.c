@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: d1d6276b4777b0883106feed491091b6fb6c580e953c022d6c95175c67d9db20
+ * body-sha256: 714c9bd8ab90759a7bdcc10ac964a2b088358e72986caec75f4487a677d4feff
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -28,12 +28,13 @@ enum { heisenberg_LEAD = 8 };     /* number of doubles before the first site of 
 enum { heisenberg_RESERVED = 7 }; /* number of arrays over the sites in the memory of a solver */
 /* number of rows that loops over a row read: the row itself and its neighbours */
 enum { heisenberg_LINES = 5 };
-enum { heisenberg_ROW = 3 }; /* number of coefficients of one flow */
+enum { heisenberg_ROW = 3 };           /* number of coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* number of rows of coefficients */
-enum { heisenberg_FLOWS = 5 }; /* number of flows in a step */
-enum { heisenberg_SPAN = 1 }; /* slices that a flow reads on each side of a slice, for wavefront blocking */
+enum { heisenberg_FLOWS = 5 };         /* number of flows in a step */
+/* number of slices that a flow reads on each side of a slice: see heisenberg_slices */
+enum { heisenberg_SPAN = 1 };
 
-/* Along each axis: the smallest number of sites, whether the ends are open. */
+/* Along each axis: the smallest number of sites, and whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
 static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 
@@ -87,7 +88,7 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
+/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -154,7 +155,7 @@ static void heisenberg_find_all_lines(heisenberg_solver *s, double *memory)
     for (size_t r = 0; r < s->rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
 }
 
-/* Row number `index`, a work item of threads. */
+/* Row number `index`: the work item of a thread. */
 static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, size_t index)
 {
     heisenberg_row row;
@@ -169,8 +170,8 @@ static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, siz
 /* number of work items for threads: the rows */
 static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
-/* Restrict a row to the sites i with from <= i < to. The loop over them is rounded up to whole vectors of 8.
-   Excess sites lie in the halo, which is updated afterwards. */
+/* Restrict a row to the sites i with from <= i < to. Callers may round `to` up to a multiple of 8, for whole
+   SIMD vectors. The sites that this adds lie in the halo, which is updated afterwards. */
 static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     row->from = from;
@@ -180,7 +181,7 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
 
 #define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 * 2^52: adding it rounds to integers */
 
-/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
+/* sin u for vectorised loops: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double heisenberg_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
@@ -221,7 +222,7 @@ static inline double heisenberg_versin_near(double t)
         (-2.480158698886182e-05 + z * (2.755707789915398e-07 + z * -2.0790896078016366e-09)))));
 }
 
-/* The flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z turned. */
+/* The flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z rotated. */
 static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -245,7 +246,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep1_near, with full-range functions. */
+/* As heisenberg_sweep1_near, for arguments of any size. */
 static inline void heisenberg_sweep1_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -269,7 +270,7 @@ static inline void heisenberg_sweep1_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z turned. */
+/* The flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z rotated. */
 static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -293,7 +294,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep2_near, with full-range functions. */
+/* As heisenberg_sweep2_near, for arguments of any size. */
 static inline void heisenberg_sweep2_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -317,7 +318,7 @@ static inline void heisenberg_sweep2_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y turned. */
+/* The flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y rotated. */
 static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -341,7 +342,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep3_near, with full-range functions. */
+/* As heisenberg_sweep3_near, for arguments of any size. */
 static inline void heisenberg_sweep3_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -365,7 +366,7 @@ static inline void heisenberg_sweep3_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_1, with full-range functions, for the row segments first ... end - 1. */
+/* The flow of H_1, for arguments of any size, for the row segments first ... end - 1. */
 static void heisenberg_rows1_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {
@@ -388,7 +389,7 @@ static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_2, with full-range functions, for the row segments first ... end - 1. */
+/* The flow of H_2, for arguments of any size, for the row segments first ... end - 1. */
 static void heisenberg_rows2_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {
@@ -411,7 +412,7 @@ static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_3, with full-range functions, for the row segments first ... end - 1. */
+/* The flow of H_3, for arguments of any size, for the row segments first ... end - 1. */
 static void heisenberg_rows3_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {
@@ -523,7 +524,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 }
 
 /* ---- The lattice ---- */
-#define heisenberg_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
+#define heisenberg_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
 
 #ifdef _OPENMP
 #ifdef __cplusplus
@@ -779,8 +780,8 @@ static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_fl
     heisenberg_wait();
 }
 
-/* Apply the flows of some steps but for the last flow; the last flow of a step is merged with the first of
-   the next. */
+/* Apply the flows of some steps except for the very last flow. Between two steps, the last flow is merged
+   with the first. */
 static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
     const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
@@ -796,7 +797,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
     }
 }
 
-/* Make steps without the last flow, which the next step includes. For 0 steps, make only the last flow. */
+/* Make steps except the very last flow, which the next step includes. For 0 steps, make only this flow. */
 static void heisenberg_shared_steps(const heisenberg_solver *s, size_t steps)
 {
     if (steps == 0) heisenberg_apply_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
@@ -857,7 +858,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    /* if s->open, continue before the last flow, which is merged with the next one */
+    /* if s->open, continue from the state before the last flow; the next flow includes it */
     heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* makes the last flow; s->before stays without it */
@@ -1049,7 +1050,7 @@ int heisenberg_holds(const heisenberg_solver *s, size_t from, size_t to)
 
 const char *heisenberg_status_string(heisenberg_status status)
 {
-    switch (status) { /* a table would be data that the loader has to relocate */
+    switch (status) { /* a table of pointers would need relocation when the library is loaded */
     case heisenberg_OK: return "ok";
     case heisenberg_NO_CONVERGENCE: return "no convergence: the step is too large";
     case heisenberg_SINGULAR: return "singular Newton matrix: the step is too large";

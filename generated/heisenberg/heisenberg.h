@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c9e2d8ac9b4f30b12ce295ec83fe9cd32e5c94d8fcf67085ba726952f0b459d7
+ * body-sha256: 58a9d2fe05f9a160029e3b9e904169f57e510165046640f77a1bb7f5c79701da
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -9,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define heisenberg_AXES 3 /* the slowest first: i, j, k */
+#define heisenberg_AXES 3 /* axes, the one with the largest stride first: i, j, k */
 #define heisenberg_DIM 3  /* fields of a site: x, y, z */
 #define heisenberg_ORDER 2
 #define heisenberg_CASIMIRS 1 /* C */
@@ -18,7 +18,7 @@ extern "C" {
 
 typedef struct {
     double J;        /* default 1.0 */
-    const double *B; /* at sites: field along z; NULL for the default at all of them */
+    const double *B; /* at sites: field along z; NULL for the default everywhere */
 } heisenberg_params;
 
 extern const heisenberg_params heisenberg_default_params;
@@ -37,10 +37,10 @@ typedef struct {
     size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
     double *x[heisenberg_ARRAYS]; /* the values of fields, then of parameters at sites */
-    double *before[heisenberg_DIM]; /* copies of the fields, which replace them if a step fails */
+    double *before[heisenberg_DIM]; /* copies of the fields, to restore them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */
@@ -63,7 +63,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 
@@ -81,8 +81,8 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range and
-   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
-   steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
+   x[array][site], and returns the number of arrays: at most heisenberg_DIM, or 3 heisenberg_DIM with
+   compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t full_range);
@@ -108,6 +108,7 @@ typedef struct {
 } heisenberg_stage;
 
 size_t heisenberg_stages(void);
+/* sets *about for stage `number` */
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
 /* heisenberg_begin computes the coefficients for a step size; call it before the first stage.

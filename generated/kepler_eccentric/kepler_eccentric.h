@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ada9ae27fef7ab0fba1992067455eaf51b3a400229ae13cbc0668596b8fcfeed
+ * body-sha256: fd53e5b546bc2cd458e14b380d183c3b3bc83ec5ab5f1b60689430a53d7dfb5f
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -15,7 +15,7 @@ extern "C" {
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
 #define kepler_eccentric_SPEC_SHA256 "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
 enum { kepler_eccentric_COEFFICIENTS = 140 }; /* number of coefficients: functions of params and h */
-enum { kepler_eccentric_GAUGES = 1 };         /* the energy level e */
+enum { kepler_eccentric_GAUGES = 1 };         /* number of entries of gauge: only the energy level e */
 
 typedef struct {
     double oblateness; /* quadrupole of the planet */
@@ -40,7 +40,7 @@ typedef struct {
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */
     size_t steps;                       /* number of successful steps since kepler_eccentric_init */
     size_t evaluations;                 /* number of computed steps, for statistics */
-    /* physical time since kepler_eccentric_init, t + t_carry; steps are equal in tau, not t */
+    /* t + t_carry is the physical time since kepler_eccentric_init; steps are equal in tau */
     double t, t_carry;
     double h;                       /* size of the last step; NaN before the first step */
     kepler_eccentric_params params; /* the parameters, set by kepler_eccentric_init; do not change them */
@@ -59,13 +59,13 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
-/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). Steps with the same e have
-   the same K. */
+/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). Steps of the same
+   size with the same e are the same map of states. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);
 
-/* Make one step or many, of size h in tau, which may be negative; s->t increases by their physical time. If a
+/* Make one step or many. Their size h in tau may be negative; s->t increases by their physical time. If a
    step fails, s->x is the state before it, after s->steps steps. */
 kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h);
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
@@ -79,7 +79,7 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7f4650fc52038e0e16da7d11bfe7d0d707f9e98364e18e541e3e25aae552b537
+ * body-sha256: d0dd200b0ef3e507f9ddfb073f02b171729acdc635bc6f31afda29b1139792b8
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -17,7 +17,7 @@ extern "C" {
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* number of coefficients: functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* number of stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* number of entries of an array over the stages */
-enum { kowalevski_gauss_UNKNOWNS = 8 };     /* unknowns of a stage */
+enum { kowalevski_gauss_UNKNOWNS = 8 };     /* number of unknowns of a stage */
 enum { kowalevski_gauss_EARLIER = 2 };      /* number of steps that predictors read */
 
 typedef struct {
@@ -35,7 +35,7 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect
-   the speed only. Unknowns are offsets from a state, which is called their frame. */
+   the speed only. Unknowns are offsets from a state, called their frame. A sweep iterates all stages once. */
 typedef struct {
     int count;     /* number of steps in the array increments */
     int latest;    /* index of the last step in the array increments */
@@ -93,12 +93,12 @@ kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solv
     size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 
-/* kowalevski_gauss_ensemble for members with separate parameters params[m] and step sizes h[m]. params may be
-   NULL for the defaults. */
+/* As kowalevski_gauss_ensemble, for members with separate parameters params[m] and step sizes h[m]. params
+   may be NULL for the defaults. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * kowalevski_gauss_DIM + i)
    * members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

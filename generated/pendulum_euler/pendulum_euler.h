@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1340ccc9a65cada629d9b46bc5e9fb4efbb7268174e7c65e1f6194f2d1a69d5a
+ * body-sha256: 97235bd52e24686068ff9f09ccad452187fbe71f5785245985d2042411ca2379
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -61,7 +61,7 @@ pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const d
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

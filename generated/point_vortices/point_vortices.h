@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f9e8288bed05914c589071e7f563485d9cca8e3a7e21419e3bbb5e952bc84163
+ * body-sha256: d1f295a2f0b69917f8fae41974c36b28b42452e17a0be8a815aacaee569842fb
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -9,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define point_vortices_AXES 1 /* i */
+#define point_vortices_AXES 1 /* axes: i */
 #define point_vortices_DIM 2  /* fields of a site: x, y */
 #define point_vortices_ORDER 4
 #define point_vortices_CASIMIRS 0
@@ -25,7 +25,7 @@ extern const point_vortices_params point_vortices_default_params;
 enum { point_vortices_ARRAYS = 3 }; /* number of arrays over sites: fields, parameters */
 enum { point_vortices_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
 enum { point_vortices_STAGES = 5 }; /* number of stages of a step */
-enum { point_vortices_DIRECTIONS = 24 }; /* dimension of a Krylov space */
+enum { point_vortices_DIRECTIONS = 24 }; /* largest dimension of a Krylov space of Newton's method */
 enum { point_vortices_DIFFERENCES = 2 }; /* number of differences in the predictor of a stage */
 enum { point_vortices_GATHERED = 4 }; /* number of sums over bonds or pairs that are stored for each site */
 
@@ -48,9 +48,9 @@ typedef struct {
     size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
     double *x[point_vortices_ARRAYS]; /* the values of fields, then of parameters at sites */
-    double *before[point_vortices_DIM]; /* copies of the fields, which replace them if a step fails */
+    double *before[point_vortices_DIM]; /* copies of the fields, to restore them if a step fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    /* solution of a stage before and after a sweep, with the parameters at sites */
+    /* solution of a stage before and after a sweep (one iteration at all sites); parameters at sites */
     double *y[2][point_vortices_ARRAYS];
     point_vortices_predictor predictor[point_vortices_STAGES]; /* predictor of each stage */
     size_t sweeps; /* number of sweeps of all stages since point_vortices_init */
@@ -80,8 +80,8 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
-   s->steps counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of
-   threads. */
+   s->steps counts the successful steps. With OpenMP, threads share the sites; the number of threads does not
+   change the bits. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eb1c024a4458e9a5ab8c69cb76a78d8b8695bc10c1af0cba44cd4675e63a6736
+ * body-sha256: 0d1b334d9179b617b9413fd114dd6ec859eb4ef244dbcd461c1404a1877743d5
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -15,7 +15,7 @@ extern "C" {
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 enum { predator_prey_COEFFICIENTS = 11 }; /* number of coefficients: functions of params and h */
-enum { predator_prey_DIFFERENCES = 9 };   /* differences in the predictor; more would amplify rounding */
+enum { predator_prey_DIFFERENCES = 9 };   /* entries of the predictor; more would amplify rounding errors */
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */
@@ -34,7 +34,7 @@ typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status); /* the meaning of a status */
 
-/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
+/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -73,7 +73,7 @@ predator_prey_status predator_prey_set_state(predator_prey_solver *s, const doub
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 105846bac4ff8088c39233955820a094f154a86108550b439c82c3ce54b97463
+ * body-sha256: 71395a3fae302d89db33dcd612b4c052237fe62e1bc4b9c4da59a8af14a12026
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -16,7 +16,7 @@ extern "C" {
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* number of coefficients: functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
-enum { quaternion_top_DIFFERENCES = 9 }; /* differences in the predictor; more would amplify rounding */
+enum { quaternion_top_DIFFERENCES = 9 }; /* entries of the predictor; more would amplify rounding errors */
 
 typedef struct {
     double I1;     /* least moment of inertia */
@@ -36,7 +36,7 @@ typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status); /* the meaning of a status */
 
-/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
+/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -52,7 +52,7 @@ typedef struct {
     double t; /* time since quaternion_top_init */
     double h; /* size of the last step; NaN before the first step */
     quaternion_top_params params; /* the parameters, set by quaternion_top_init; do not change them */
-    double gauge[quaternion_top_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */
+    double gauge[quaternion_top_GAUGES]; /* gauge[k] times Casimir k is subtracted from H */
     double coef[quaternion_top_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
@@ -80,7 +80,7 @@ quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const d
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6020ee47499f048bb5a4ad2c070c64c7d9dcb16c9c0fe0481d7d3deb87e72ef0
+ * body-sha256: 4d5305da1900c46b5a3b80d39be4bcb81437800fc3ace32d56833fe7793516e9
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -50,7 +50,8 @@ typedef struct {
     int slow_steps; /* recent steps that took more than one iteration */
     int slow_steps_allowed; /* value of slow_steps at which the recurrence is fitted again */
     double past[rigid_body_STORED_VALUES][rigid_body_DIM]; /* solutions, the latest last */
-    /* weights of past solutions, the latest first, in the next rigid_body_AHEAD solutions */
+    /* factors of the past solutions, the latest first, in predictions of the next rigid_body_AHEAD
+       solutions */
     double weight[rigid_body_WINDOW][rigid_body_DIM][rigid_body_AHEAD];
 } rigid_body_history;
 
@@ -76,7 +77,7 @@ typedef struct {
     double t; /* time since rigid_body_init */
     double h; /* size of the last step; NaN before the first step */
     rigid_body_params params; /* the parameters, set by rigid_body_init; do not change them */
-    double gauge[rigid_body_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */
+    double gauge[rigid_body_GAUGES]; /* gauge[k] times Casimir k is subtracted from H */
     double coef[rigid_body_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
@@ -110,14 +111,14 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* rigid_body_ensemble for members with parameters params[m], step size h[m], and gauge: gauge[m *
-   rigid_body_GAUGES + k] is the factor by which Casimir k is subtracted from H. params may be NULL for the
-   defaults, gauge for factors chosen at the initial states. */
+/* As rigid_body_ensemble, for members with parameters params[m], step size h[m], and gauge: gauge[m *
+   rigid_body_GAUGES + k] times Casimir k is subtracted from H. params may be NULL for the defaults, gauge for
+   factors chosen at the initial states. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
    members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

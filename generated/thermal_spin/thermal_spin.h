@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7d763dbe2c6bffdfe82a5d719e0ffdd76c97a0cde099da1408b9b453e5af7476
+ * body-sha256: e4f642466dd6a6389d99e0f6b9b6c36e72f8c1773c11fa8fb040acfd1dfef439
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -18,8 +18,9 @@ extern "C" {
 /* number of coefficients: functions of params and h, and of the noise */
 enum { thermal_spin_COEFFICIENTS = 13 };
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
-enum { thermal_spin_DRAWS = 3 };   /* increments of all sources in a step */
-enum { thermal_spin_PARTS = 1 };   /* increments of one source in a step, one for each part of the step */
+enum { thermal_spin_DRAWS = 3 };   /* number of increments of all sources in a step */
+/* number of increments of one source in a step, one for each part of the step */
+enum { thermal_spin_PARTS = 1 };
 
 typedef struct {
     double B;            /* field along z */
@@ -28,13 +29,14 @@ typedef struct {
 } thermal_spin_params;
 extern const thermal_spin_params thermal_spin_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
-   NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x), with the forces zeta
+   and f. params may be NULL. */
 double thermal_spin_hamiltonian(const thermal_spin_params *params, const double x[3]);
 void thermal_spin_casimirs(const thermal_spin_params *params, const double x[3], double out[]);
 void thermal_spin_vector_field(const thermal_spin_params *params, const double x[3], double out[3]);
 
-/* The vector field sigma pi(x) grad g(x) of each source of noise, in order. params may be NULL. */
+/* For each source of noise, its amplitude sigma times the vector field pi(x) grad g(x). params may be
+   NULL. */
 void thermal_spin_noise_fields(const thermal_spin_params *params, const double x[3], double out[9]);
 
 typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR,
@@ -86,7 +88,7 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     const double *dw);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 08e4246f5d6626d4325211e7aeb911c5225282f980f1e8c1571291407f46480e
+ * body-sha256: 5b1a928a21738015f4262d7d246c79da50b3465fb702de2f38b3b8842947de06
  */
 #include "toda.h"
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
+/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -104,15 +104,15 @@ static inline toda_row toda_row_of(const toda_solver *s)
     return row;
 }
 
-enum { toda_PIECE = 1024 }; /* sites of a work item, for any number of threads */
+enum { toda_PIECE = 1024 }; /* number of sites in a segment of the row */
 
-/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
+/* Number of segments of the row. The last one also has the sites that are left over: no segment is short. */
 static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
 }
 
-/* Segment number `unit` of the row, a work item of threads. */
+/* Segment number `unit` of the row: the work item of a thread. */
 static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
 {
     toda_row row = toda_row_of(s);
@@ -148,7 +148,7 @@ static inline double toda_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
+/* exp(u) - 1 for vectorised loops. NaN for |u| > 700. */
 static inline double toda_expm1_lane(double u)
 {
     double power;
@@ -236,7 +236,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-#define toda_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
+#define toda_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
 
 enum { toda_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
@@ -339,14 +339,14 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* ---- The flows ---- */
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flow `number` of a step; toda_FLOWS means the last flow merged with the first one. */
+/* Apply flow `number` of step `steps`, from 0 on; toda_FLOWS is the last flow merged with the first one. */
 static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;
     toda_sweep_part(s, toda_flow_parts[number], s->coef + number * toda_ROW);
 }
 
-/* Make steps without the last flow, which the next step includes. For 0 steps, make only the last flow. */
+/* Make steps except the very last flow, which the next step includes. For 0 steps, make only this flow. */
 static void toda_steps(const toda_solver *s, size_t steps)
 {
     if (steps == 0) toda_apply_flow(s, s->steps - 1, toda_FLOWS - 1);
@@ -388,7 +388,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    /* if s->open, continue before the last flow, which is merged with the next one */
+    /* if s->open, continue from the state before the last flow; the next flow includes it */
     toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* makes the last flow; s->before stays without it */
@@ -460,7 +460,7 @@ void toda_vector_field(const toda_solver *s, double *out)
 
 const char *toda_status_string(toda_status status)
 {
-    switch (status) { /* a table would be data that the loader has to relocate */
+    switch (status) { /* a table of pointers would need relocation when the library is loaded */
     case toda_OK: return "ok";
     case toda_NO_CONVERGENCE: return "no convergence: the step is too large";
     case toda_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: edee590a858e44fe361517fc302078210d0085e7923948ef1c7d9cda10d6aee4
+ * body-sha256: 8a1bc173ee1aba522a8dfdbc6d6fb52d79aa1e992b00a888cbf1b50df9cd71f8
  */
 #ifndef TODA_H
 #define TODA_H
@@ -9,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define toda_AXES 1 /* i */
+#define toda_AXES 1 /* axes: i */
 #define toda_DIM 2  /* fields of a site: a, b */
 #define toda_ORDER 4
 #define toda_CASIMIRS 2 /* momentum, length */
@@ -36,9 +36,9 @@ typedef struct {
     size_t sites, rows; /* number of sites, and of rows */
     ptrdiff_t length, width; /* number of sites of a row; number of doubles from a row to the next */
     double *x[toda_ARRAYS]; /* the values of fields, then of parameters at sites */
-    double *before[toda_DIM]; /* copies of the fields, which replace them if a step fails */
+    double *before[toda_DIM]; /* copies of the fields, to restore them if a step fails */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that use functions for arguments of any size */
+    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */
@@ -61,7 +61,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 
@@ -69,8 +69,8 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 void toda_state(const toda_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range and
-   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated
-   steps. To restore, call toda_init, then toda_resume with these values. */
+   x[array][site], and returns the number of arrays: at most toda_DIM, or 3 toda_DIM with compensated steps.
+   To restore, call toda_init, then toda_resume with these values. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *full_range);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

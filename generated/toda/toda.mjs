@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2966b071c7c3f45057641631fc0720e605f2fa19448eb70b7cfa00358ad6f7da
+ * body-sha256: 7bdd8cdb0740291fbee441e92b0e360e30c6d66477d5c74deefb6389007a7a9f
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -141,7 +141,7 @@ function vectorField(params, x, sites, out) {
   }
 }
 
-/** Step size of the evaluation that checks the parameters. */
+/** Parameters are checked by the coefficients of this step size. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

@@ -189,13 +189,17 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
     rules = build.rules()
     later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
     point = [ir.vectors(ir.Vector(series), E), *[ir.vectors(values, F)] * bool(path.fixed)]
-    of_series = f"Coefficients of order 0 in the series of a {kind}; those of the coordinates are given"
-    of_order = "Coefficient k of the series, and coefficient k + 1 of the coordinates"
+    of_series = (
+        f"Compute the coefficients of order 0 of all Taylor series of a {kind}; those of the coordinates are given"
+    )
+    of_order = "Compute coefficient k of all Taylor series, and coefficient k + 1 of the coordinates"
     at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
     return [
         function("begin", of_series, ("coef", "p", "s", "f"), *build.fixed(), *build.first()),
         function("order", of_order, ("coef", "p", "s", "f", "k"), *later, *build.slopes()),
-        function("field", f"Slope of the {kind} at a point m", ("coef", "p", "m", "field"), *at_point),
+        function(
+            "field", f"Compute the derivative dm/dt of a {kind} at a point m", ("coef", "p", "m", "field"), *at_point
+        ),
     ]
 
 

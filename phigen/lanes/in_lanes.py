@@ -441,7 +441,10 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
     needed = set(topological([v for o in outputs for v in o.values]))
     named = tuple((name, value) for name, value in kernel.named if value in needed)
-    return replace(kernel, name="evaluate", outputs=outputs, named=named)
+    purpose = (
+        "at the point y, with the momenta p = grad S_h(y): the displacement alpha - y and the increment beta - alpha"
+    )
+    return replace(kernel, name="evaluate", purpose=purpose, outputs=outputs, named=named)
 
 
 #: The function that finds the parts in lanes, for each kind of step that has such parts.

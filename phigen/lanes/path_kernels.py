@@ -41,7 +41,7 @@ def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> t
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
     """Return the kernels for blocks of steps along Karasev's paths, which are solved together in SIMD lanes."""
-    momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
+    momentum = Kernel("momentum", "the momenta p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
 

@@ -95,7 +95,7 @@ class SeriesPlan:
         return [
             *since,
             f"bi-realisation (alpha, beta): {self.realisation.kind}, symmetric; steps from alpha(y, p) to beta(y, p)",
-            "generating function S_h, p = grad S_h(y): S_1",
+            "generating function: p = grad S_h(y), S_h = h S_1",
             step,
             *composed,
         ]
@@ -118,19 +118,19 @@ class SeriesPlan:
         relax = site_kernel(
             cell,
             "relax",
-            "one fixed-point iteration for y at a site, from x at the site",
+            "at each site, one fixed-point iteration for y, from x",
             values[:size],
             "y",
             coefficients,
             Role.RELAX,
         )
-        purpose = "increment of x at a site by a stage, from y at the site and its neighbours"
+        purpose = "at each site, the increment of x by a stage, from y"
         advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
         slopes = coefficients.hoist(along(cell, values[:size]))
         slope = site_kernel(
             cell,
             "slope",
-            "derivative of the iteration for y at a site along a variation of y",
+            "at each site, the derivative of the iteration for y along a variation of y",
             slopes,
             "v",
             coefficients,
@@ -142,13 +142,13 @@ class SeriesPlan:
         side = site_kernel(
             cell,
             "side",
-            "derivative of the iteration for y at a site along a variation of x",
+            "at each site, the derivative of the iteration for y along a variation of x",
             starts,
             "v",
             coefficients,
             Role.SIDE,
         )
-        purpose = "derivative of the increment of x at a site along a variation of y"
+        purpose = "at each site, the derivative of the increment of x along a variation of y"
         follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)
         return Equation(relax, advance, slope, (side, follow))
 

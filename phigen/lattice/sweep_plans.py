@@ -452,7 +452,7 @@ def _sweep(
     location = f" on the seam {flow.window}" if flow.window else " near seams" if near_seam else ""
     purpose = f"the flow of {hamiltonian}{location}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
-    purpose = f"contributions of all other sites b to the forces of H_{k} at a site a"
+    purpose = f"for each site a, the sum of the forces of H_{k} by {_others(cell)} b"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients, late=late) if tangent else None
     inside, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
@@ -472,7 +472,7 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
     kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)
     sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
-    purpose = "contributions of all other sites b to forces at a site a, and to their variations"
+    purpose = f"for each site a, the sums of the forces by {_others(cell)} b, and of their variations"
     return Sweep(kernel, updated, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
 
 
@@ -491,7 +491,7 @@ def _gather(
         values = list(s.values.values())
         values = coefficients.hoist(values) if coefficients else values
         verb = {"a": "begin", "b": "end"}.get(s.end)
-        suffix, condition = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
+        suffix, condition = (f"_{s.end}", f", for bonds that {verb} at a") if verb else ("", "")
         ends.append(
             Ends(
                 site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients, Role.GATHER),
@@ -503,6 +503,11 @@ def _gather(
     return Gather(tuple(ends), tuple(sums[0].values))
 
 
+def _others(cell: Cell) -> str:
+    """Return in words with which sites a site has bonds or pairs."""
+    return "its neighbours" if cell.relation == GRAPH else "all other sites"
+
+
 def _partners(cell: Cell, *, varied: bool) -> Partners | None:
     """Return the kernels of bonds or pairs for energies, forces and observables; None on a grid.
 
@@ -511,13 +516,15 @@ def _partners(cell: Cell, *, varied: bool) -> Partners | None:
     if cell.relation == GRID:
         return None
     kind = "bond" if cell.relation == GRAPH else "pair"
-    empty, purpose, sums = Gather((), ()), "contribution of a site b to the forces at a site a", site_sums(cell)
+    empty, sums = Gather((), ()), site_sums(cell)
+    purpose = f"for each site a, the sum of the forces by {_others(cell)} b"
     varied_sums = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
     return Partners(
-        _gather(cell, energies(cell), f"{kind}_energy", f"the energy of a {kind}") or empty,
+        _gather(cell, energies(cell), f"{kind}_energy", f"for each site a, the sum of the energies of its {kind}s")
+        or empty,
         _gather(cell, sums, f"{kind}_forces", purpose) or empty,
         cell.relation == GRAPH,
-        _gather(cell, varied_sums, f"{kind}_slopes", f"{purpose}, and to their variations") or empty,
+        _gather(cell, varied_sums, f"{kind}_slopes", f"{purpose}, and of their variations") or empty,
         _gather(cell, observed_sums(cell), f"{kind}_quantities", f"the densities of observables of a {kind}") or empty,
     )
 

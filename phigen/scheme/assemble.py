@@ -199,12 +199,12 @@ def _facts(
 ) -> Iterator[str]:
     """Yield the lines on the method for the header of generated files; some may be empty."""
     generating = scheme.generating
-    series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
+    series = "h S_1" if scheme.terms == 1 else f"h S_1 + ... + h^{scheme.terms} S_{scheme.terms}"
     terms = f", {generating.terms} term{'s' * (generating.terms > 1)}" if generating.terms else ""
     symmetry = "symmetric" if realisation.symmetric else "not symmetric"
     yield f"bi-realisation (alpha, beta): {realisation.kind}, {symmetry}; steps from alpha(y, p) to beta(y, p)"
     yield from approximation(realisation)
-    yield f"generating function S_h, p = grad S_h(y): {series} ({generating.form}{terms})"
+    yield f"generating function: p = grad S_h(y), S_h = {series} ({generating.form}{terms})"
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
     g = "g " * bool(gauge.monitor)

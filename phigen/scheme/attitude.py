@@ -51,7 +51,10 @@ def stage_attitude(
     """Return the attitude of an implicit step. The coefficients of its kernels are added to the table of
     ``generating``."""
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
-    p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
+    p, slope = (
+        list(generating.turning),
+        "grad S_h(y), without the forces," if generating.free else "the momenta p = grad S_h(y)",
+    )
     values = coefficients.hoist(_element_less_one(group, p, cayley))
     purpose = (
         f"the attitude increment of a stage with {slope}: a {'matrix' if group.matrices else 'quaternion'} minus 1"

@@ -155,10 +155,10 @@ def full(n: int) -> Pattern:
 def _elimination_kernel(pattern: Pattern, *, transposed: bool = False) -> Kernel:
     n = len(pattern)
     solution, reciprocals = transposed_elimination(pattern) if transposed else elimination(pattern)
-    whose = " for the transpose of the matrix" * transposed
+    which = "(transposed matrix)" if transposed else "matrix"
     return Kernel(
         "eliminate_transposed" if transposed else "eliminate",
-        f"elimination without pivoting{whose}: the solution, and the reciprocals of the pivots",
+        f"solve {which} * solution = side by elimination without pivoting; reciprocal: 1 / the pivots",
         {"matrix": _entries("J", n), "side": tuple(Symbol("r", i) for i in range(n))},
         (Output("solution", tuple(solution)), Output("reciprocal", reciprocals)),
     )
@@ -209,7 +209,7 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
         ]
     return Kernel(
         "invert",
-        "elimination without pivoting: the inverse, the matrix slope times the inverse, reciprocals of the pivots",
+        "the inverse of matrix by elimination without pivoting; gain: slope * inverse; reciprocal: 1 / the pivots",
         {"matrix": _entries("J", n), "slope": _entries("K", n)},
         (Output("inverse", tuple(entries)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
     )
@@ -230,7 +230,8 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
     flat = coefficients.hoist([*generating.slope, *jacobian])
     return Kernel(
         "generate",
-        "the momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2)",
+        "the momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of the equation "
+        "for p up to O(h^2)",
         {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),
     )
@@ -269,7 +270,7 @@ def noise_fields(system: System) -> Kernel:
     """Return the kernel of the vector fields σ π∇g of all sources of noise, one after the other."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
-    purpose = "the vector field sigma pi(x) grad g(x) of each source of noise"
+    purpose = "for each source of noise, its amplitude sigma times the vector field pi(x) grad g(x)"
     return Kernel("noise_fields", purpose, system_inputs(system), (Output("out", values),))
 
 

@@ -71,7 +71,10 @@ class Logarithmic:
 def fact_of(negative: str) -> str:
     """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is the negative part of
     H as text."""
-    return f"monitor: log; steps of K = log(A + e) - log(-B), equal in tau, with H = A + B, e = -H(x0), B = {negative}"
+    return (
+        "monitor: log; steps are equal in tau, and follow K = log(A + e) - log(-B), where H = A + B, e = -H(x0),"
+        f" B = {negative}"
+    )
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:

@@ -61,7 +61,7 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}; steps are equal in tau"
     elif monitor:
-        yield f"monitor: dt = g dtau with g = {monitor}; steps of K = g (H + e), e = -H(x0), equal in tau"
+        yield f"monitor: dt = g dtau with g = {monitor}; steps are equal in tau, and follow K = g (H + e), e = -H(x0)"
 
 
 def monitor_of(spec: Spec) -> Expression | None:

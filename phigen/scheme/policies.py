@@ -44,7 +44,7 @@ def count(value: int, description: str) -> int:
 class StartPolicy(Policy):
     """The first evaluation of the coefficients, which checks the values of parameters before a step size is known."""
 
-    probe_step: float = number(1e-100, "step size of the evaluation that checks the parameters")
+    probe_step: float = number(1e-100, "parameters are checked by the coefficients of this step size")
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,15 @@ class MeasurePolicy(Policy):
     ``floor`` is 0 if the coordinates keep their signs, since the sizes of these coordinates may differ much.
     """
 
-    floor: float = number(1e-6, "a correction is relative to |y_i| + this fraction of the largest |y_j|")
+    floor: float = number(1e-6, "delta_i is relative to |y_i| + this times the largest |y_j|")
 
 
 @dataclass(frozen=True)
 class NewtonPolicy(Policy):
     """Newton's method for the implicit equation of a step; its tolerance is in `InnerSolve`."""
 
-    nearly_solved: float = number(1e-8, "a correction below this may be rounding")
-    shrinking: float = number(0.25, "corrections below NEARLY_SOLVED that do not shrink by this factor are rounding")
+    nearly_solved: float = number(1e-8, "after a correction below this, slow iterations end")
+    shrinking: float = number(0.25, "iterations are slow if a correction exceeds this fraction of the one before")
 
 
 @dataclass(frozen=True)
@@ -80,22 +80,20 @@ class PathPolicy(Policy):
         512,
         "largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state",
     )
-    patience: int = count(3, "after so many iterations, it is checked whether the approximate Jacobian is good enough")
-    negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
-    least_share: float = number(
-        1e-5, "terms in coordinate i are relative to |x_i| + this fraction of the sum of all |x_j|"
+    patience: int = count(3, "number of iterations before the approximate Jacobian may be replaced by differences")
+    negligible: float = number(
+        1e-17, "a Taylor series ends if its terms are below this fraction of the size of the path"
     )
-    rounded_slope: float = number(
-        2e-15, "largest rounding error of dm/dt at the end m of a path, relative to m and dm/dt"
-    )
+    least_share: float = number(1e-5, "size of a path m in coordinate i: |m_i| + this times the sum of all |m_j|")
+    rounded_slope: float = number(2e-15, "tolerated error of dm/dt at the end m of a path, relative to |m| + |dm/dt|")
     difference: float = number(
-        1e-7, "difference of arguments in a difference quotient, relative to p: the square root of rounding"
+        1e-7, "step of difference quotients, relative to p: about the square root of its rounding errors"
     )
-    solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
-    nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
-    shrinking: float = number(0.25, "residuals below NEARLY_SOLVED that do not shrink by this factor are rounding")
+    solved: float = number(4e-16, "iterations end if the residual is below this, relative to p")
+    nearly_solved: float = number(1e-12, "after a residual below this, slow iterations end")
+    shrinking: float = number(0.25, "iterations are slow if a residual exceeds this fraction of the one before")
     contracting: float = number(
-        0.05, "a Jacobian is useful if an iteration multiplies the residual by no more than this"
+        0.05, "the Jacobian is replaced if an iteration multiplies the residual by more than this"
     )
 
 
@@ -168,8 +166,8 @@ class TangentPolicy(Policy):
     """The additional Newton iterations that solve the implicit equation to the last bit before a step is
     differentiated."""
 
-    tangent_solved: float = number(1e-15, "a correction below this is rounding")
-    tangent_nearly_solved: float = number(1e-10, "a correction below this that no longer shrinks is rounding too")
+    tangent_solved: float = number(1e-15, "a correction below this consists of rounding errors")
+    tangent_nearly_solved: float = number(1e-10, "so does a correction below this that no longer shrinks")
     tangent_shrinking: float = number(0.25, "a correction has shrunk if it is below this fraction of the one before")
 
 
@@ -177,10 +175,12 @@ class TangentPolicy(Policy):
 class GaussTangentPolicy(Policy):
     """Sweeps that solve the linear equations for the derivatives of the stages of a Gauss step."""
 
-    tangent_solved: float = number(1e-17, "a relative change below this is rounding")
-    tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
+    tangent_solved: float = number(1e-17, "a relative change below this consists of rounding errors")
+    tangent_nearly_solved: float = number(
+        1e-13, "a residual below this may consist of rounding errors: see TANGENT_SHRINKING"
+    )
     tangent_shrinking: float = number(
-        0.4, "residuals below TANGENT_NEARLY_SOLVED are rounding if the ratio of two in a row exceeds this"
+        0.4, "a residual below TANGENT_NEARLY_SOLVED is accepted if it exceeds this fraction of the one before"
     )
 
 
@@ -201,7 +201,9 @@ class GaussAdjointPolicy(Policy):
 class PathTangentPolicy(Policy):
     """The Taylor series of a path together with its variation, for the derivatives of a step."""
 
-    tangent_negligible: float = number(1e-18, "terms below this fraction of |start| + |sum of the terms| are rounding")
+    tangent_negligible: float = number(
+        1e-18, "terms below this fraction of |start| + |sum of the terms| are negligible"
+    )
     tangent_rounded_slope: float = number(
         1e-13, "accepted error of the slopes of a path and its variation, relative to path and slope"
     )
@@ -212,10 +214,10 @@ class LatticeSweepPolicy(Policy):
     """Sweeps over a lattice that solve a stage, for steps with a generating function."""
 
     differences: int = count(4, "number of differences in the predictor of a stage")
-    patience: int = count(10, "sweeps before Newton's method may replace slow sweeps")
-    least_size: float = number(1e-3, "smaller fields count as this share of the largest")
+    patience: int = count(10, "number of sweeps before Newton's method may replace slow sweeps")
+    least_size: float = number(1e-3, "size of a field: its largest |y| + this times the largest |y| of all fields")
     settled: float = number(2.0**-55, "expected relative change of y below which sweeps end")
-    rounding: float = number(2.0**-40, "changes below this may be rounding")
+    rounding: float = number(2.0**-40, "changes below this may consist of rounding errors")
     slow: float = number(0.6, "convergence is slow if a change exceeds this fraction of the change before")
     nearly_settled: float = number(2.0**-30, "Newton's method does not take over at changes below this")
 
@@ -226,10 +228,10 @@ class LatticeNewtonPolicy(Policy):
     equations."""
 
     directions: int = count(24, "dimension of the Krylov space in which a correction is computed")
-    solved: float = number(1e-6, "the iteration for a correction ends at this relative residual")
+    solved: float = number(1e-6, "GMRES for a Newton correction ends at this relative residual")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(
-        1.5, "largest accepted distance of a solution from x, relative to |x| + |first change of x|"
+        1.5, "largest accepted |y - x| of a solution y, relative to |x| + |change of y = x by one sweep|"
     )
 
 
@@ -237,8 +239,10 @@ class LatticeNewtonPolicy(Policy):
 class LatticeTangentPolicy(Policy):
     """The linear equation for a tangent vector of a step of a lattice, solved by iterative corrections."""
 
-    carried: float = number(2.0**-54, "a residual below this fraction of the tangent vector is rounding")
-    nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is rounding too")
+    carried: float = number(
+        2.0**-54, "a residual below this fraction of the tangent vector consists of rounding errors"
+    )
+    nearly_carried: float = number(1e-11, "so does a residual below this that no longer shrinks")
     carried_shrinking: float = number(0.5, "a residual has shrunk if it is below this fraction of the one before")
 
 

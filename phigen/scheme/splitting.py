@@ -104,9 +104,10 @@ def build_splitting(
 
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
     increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
+    part = "the part of K with " * bool(monitor)
     return Kernel(
         f"flow{k}",
-        f"the flow of {_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),
+        f"the flow of {part}{_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),
         {"coef": coefficients.slots, "state": system.coordinates},
         (Output("increment", tuple(increment)),),
     )
@@ -162,7 +163,7 @@ def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[st
         return ["scheme: the exact flow of H, which is elementary", f"step: {step.kind.manner}"]
     names = [(f"{flow.letter}_{k}", flow.force) for k, flow in enumerate(choice.splitting.flows, 1)]
     parts, forces = (" + ".join(n for n, force in names if bool(force) == acting) for acting in (False, True))
-    reason = f", since {choice.why}" if choice.why else ""
+    reason = f"; chosen since {choice.why}" if choice.why else ""
     return [
         f"scheme: splitting, H = {parts}" + f", forces {forces}" * bool(forces) + ", with the exact flow of each part",
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows} flows{further}{reason}",

@@ -45,7 +45,7 @@ EXPLICIT = StepKind("explicit", "a formula", "explicit")
 PATH = StepKind(
     "path",
     "paths, computed by their Taylor series",
-    "implicit in p; paths dm/dt = pi(m) p by Taylor series to round-off",
+    "along a path dm/dt = pi(m) p, by Taylor series to round-off; implicit: p = grad S_h(mean of the path)",
     unit="evaluation of the equation for p",
     implicit=True,
     predicted=True,

@@ -152,7 +152,7 @@ def _without_quotients(
     speed = t * call("sinroot", s / 4)
     versine, arc_rest = _HALF * speed**2, t**3 * call("arcroot", s)
     increments = tuple(t * u + (versine * v + arc_rest * w) for u, v, w in zip(first, second, third, strict=True))
-    return Solution(increments, "turned and shifted")
+    return Solution(increments, "rotated and shifted")
 
 
 def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
@@ -170,7 +170,7 @@ def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequ
     twice = min(twice, second_images, key=lambda entries: len(list(topological(entries))))
     speed = symbol(TIME) * ring.expression(factor) * call("sinroot", s / 4)
     sine, versine = speed * call("cosroot", s / 4), _HALF * speed**2
-    return Solution(tuple(sine * u + versine * v for u, v in zip(once, twice, strict=True)), "turned")
+    return Solution(tuple(sine * u + versine * v for u, v in zip(once, twice, strict=True)), "rotated")
 
 
 def _static_factor(ring: Ring, a: Matrix) -> Poly:
@@ -190,10 +190,10 @@ def _circular(
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
-        return Solution(tuple(sine * u + versine * v for u, v in zip(*units, strict=True)), "turned")
+        return Solution(tuple(sine * u + versine * v for u, v in zip(*units, strict=True)), "rotated")
     difference, t = angle - sine, symbol(TIME)
     increments = tuple(t * f + (versine * u + difference * v) for f, u, v in zip(first, *units, strict=True))
-    return Solution(increments, "turned and shifted")
+    return Solution(increments, "rotated and shifted")
 
 
 def _hyperbolic(

@@ -75,7 +75,7 @@ STATE = (
     StateBlock(
         "t",
         "MONITOR",
-        ("double t, t_carry;     /* physical time since phi_init, t + t_carry; steps are equal in tau, not t */",),
+        ("double t, t_carry;     /* t + t_carry is the physical time since phi_init; steps are equal in tau */",),
         saved=(("t", ""), ("t_carry", "")),
         copied=("twin.tCarry = this.tCarry;",),
     ),
@@ -107,7 +107,7 @@ STATE = (
     StateBlock(
         "gauge",
         "GAUGE && !MONITOR",
-        ("double gauge[PHI_GAUGES]; /* gauge[k] is the factor by which Casimir k is subtracted from H */",),
+        ("double gauge[PHI_GAUGES]; /* gauge[k] times Casimir k is subtracted from H */",),
     ),
     StateBlock("common", "COMMON", ("PHI_COMMON_MEMBER",)),
     StateBlock(

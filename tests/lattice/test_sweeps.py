@@ -372,7 +372,7 @@ def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None
     )
     for said, name, body in comments:
         moved = re.findall(r"^ *(\w)_row\[i\] =", body, re.M)
-        assert all(line.endswith(f"{', '.join(moved)} turned.") for line in said.split("\n")), (name, said)
+        assert all(line.endswith(f"{', '.join(moved)} rotated.") for line in said.split("\n")), (name, said)
     bodies = [body for *_, body in comments]
     assert len(bodies) == len(set(bodies)) < sum(said.count("The flow of") for said, *_ in comments)
 

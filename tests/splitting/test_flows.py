@@ -21,12 +21,12 @@ SYSTEMS = {
     "one part": (PLANE + "hamiltonian: p**2/2", ["q shifted"]),
     "a sum whose parts do not commute": (
         PLANE + "parameters: {m: 2, k: 3}\nhamiltonian: p**2/(2*m) + k*q**2/2 + p*q/5",
-        ["q, p turned"],
+        ["q, p rotated"],
     ),
     "uniform electric and magnetic fields": (
         "coordinates: [x, y, u, v]\nparameters: {B: 2}\n"
         "poisson: {brackets: {x: {u: 1}, y: {v: 1}, u: {v: B}}}\nhamiltonian: (u**2 + v**2)/2 + x/3",
-        ["x, y, u, v turned and shifted"],
+        ["x, y, u, v rotated and shifted"],
     ),
     "a body with a Casimir taken out": (
         BODY + "parameters: {I: {value: 2, positive: true}}\nhamiltonian: x**2/2 + y**2/I + z**2/4",
@@ -41,7 +41,7 @@ SYSTEMS = {
         "coordinates: [a, b, c, u, v, w]\n"
         "poisson: {brackets: {a: {b: c, c: -b}, b: {c: a}, u: {v: w, w: -v}, v: {w: u}}}\n"
         "hamiltonian: a*u + b*v + c*w",
-        ["a, b, c turned; u, v, w by linear integrals"],
+        ["a, b, c rotated; u, v, w by linear integrals"],
     ),
     "three spins with a sum to keep": (
         "coordinates: [a1, b1, c1, a2, b2, c2, a3, b3, c3]\n"
@@ -49,7 +49,7 @@ SYSTEMS = {
         " a3: {b3: c3, c3: -b3}, b3: {c3: a3}}}\n"
         "hamiltonian: a1*a2 + b1*b2 + c1*c2 + a2*a3 + b2*b3 + c2*c3 + a3*a1 + b3*b1 + c3*c1\n"
         "invariants: {A: a1 + a2 + a3, B: b1 + b2 + b3, C: c1 + c2 + c3}",
-        [f"a{i}, b{i}, c{i} turned; a{k}, b{k}, c{k} by linear integrals" for i, k in ((1, 2), (1, 3), (2, 3))],
+        [f"a{i}, b{i}, c{i} rotated; a{k}, b{k}, c{k} by linear integrals" for i, k in ((1, 2), (1, 3), (2, 3))],
     ),
     "Riccati equations": (
         "coordinates: [x, y]\npoisson: {brackets: {x: {y: 1 - x**2 - y**2}}}\nhamiltonian: x + y**2",
@@ -73,10 +73,10 @@ SYSTEMS = {
         "hamiltonian: x**2 + y*z + z**3",
         ["x shifted", "y, z shifted"],
     ),
-    "rotations": (BODY + "hamiltonian: x**4 + y**4 + z**4", ["x, y turned", "x, z turned", "y, z turned"]),
+    "rotations": (BODY + "hamiltonian: x**4 + y**4 + z**4", ["x, y rotated", "x, z rotated", "y, z rotated"]),
     "angular velocity with a parameter": (
         BODY + "parameters: {I: 2}\nhamiltonian: x**2/I + sqrt(1 + y**2)",
-        ["x, z turned", "y, z turned"],
+        ["x, z rotated", "y, z rotated"],
     ),
     "hyperbolic rotations": (
         "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: z, z: y}, y: {z: x}}}\nhamiltonian: x**2 + y**2 + z",
@@ -107,7 +107,7 @@ SYSTEMS = {
     "two vortices": (
         "coordinates: [x, y, u, v]\npoisson: {canonical: {q: [x, u], p: [y, v]}}\n"
         "hamiltonian: log((x - u)**2 + (y - v)**2)",
-        ["x, y, u, v turned"],
+        ["x, y, u, v rotated"],
     ),
     "a rate that may vanish": (
         "coordinates: [a, b, c]\npoisson: {brackets: {a: {b: a}, b: {c: 2*a**2}}}\nhamiltonian: a + b**2 + c",
@@ -115,23 +115,23 @@ SYSTEMS = {
     ),
     "the height of a pendulum as a coordinate": (
         "coordinates: [x, p, V]\npoisson: {nambu: [V + cos(x)]}\nhamiltonian: p**2/2 + V",
-        ["x shifted; V turned", "p shifted"],
+        ["x shifted; V rotated", "p shifted"],
     ),
     "a rotation about a vector that stands still": (
         "coordinates: [x, y, z, u, v, w, a, b, c]\n"
         "poisson: {brackets: {x: {y: -z, z: y, v: -w, w: v, b: -c, c: b}, y: {z: -x, u: w, w: -u, a: c, c: -a},"
         " z: {u: -v, v: u, a: -b, b: a}}}\nparameters: {n: 0.3}\nhamiltonian: n*(x*u + y*v + z*w) + a**2 + 2*b**2",
-        ["a, b, c turned", "x, y, z shifted"],
+        ["a, b, c rotated", "x, y, z shifted"],
     ),
     "a rotation about the momenta of wheels": (
         "coordinates: [x, y, z, a, b, c, u, v, w]\n"
         "poisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}, a: {u: 1}, b: {v: 1}, c: {w: 1}}}\n"
         "hamiltonian: x*u + y*v/2 + z*w/3 + cos(a)",
-        ["u shifted", "x, y, z, a, b, c turned and shifted"],
+        ["u shifted", "x, y, z, a, b, c rotated and shifted"],
     ),
     "a static vector beside a quadratic term": (
         BODY + "parameters: {B: 2}\nhamiltonian: x**2/2 + B*x + y + z/3",
-        ["x, y, z turned", "y, z turned"],
+        ["x, y, z rotated", "y, z rotated"],
     ),
     "a field that depends on the place": (
         "coordinates: [x, y, u, v]\npoisson: {brackets: {x: {u: 1}, y: {v: 1}, u: {v: 1 + x**2 + y**2}}}\n"

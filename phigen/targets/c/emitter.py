@@ -177,7 +177,13 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
         held = f"number of Casimirs whose multiples are subtracted from H: {', '.join(program.held)}"
-        sizes.append(("GAUGES", len(program.held), "the energy level e" if program.monitor else held))
+        sizes.append(
+            (
+                "GAUGES",
+                len(program.held),
+                "number of entries of gauge: only the energy level e" if program.monitor else held,
+            )
+        )
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
         trail = text_of(program).trail(program, step, lanes)
@@ -193,7 +199,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
             (
                 "DIFFERENCES",
                 predictor.differences,
-                "differences in the predictor; more would amplify rounding",
+                "entries of the predictor; more would amplify rounding errors",
             )
         )
     sizes += text_of(program).declared(step, lanes)
@@ -246,7 +252,8 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
     yield (
-        f"The Hamiltonian{at}; the Casimirs; the right-hand side {right_hand_side(program)}. params may be NULL.",
+        f"The Hamiltonian{at}; the Casimirs; the right-hand side {right_hand_side(program)}"
+        f"{', with the forces zeta and f' * program.forced}. params may be NULL.",
         [(seen.energy, "hamiltonian", True), (seen.casimirs, "casimirs", False), (seen.vector_field, "", False)],
     )
     if seen.named:
@@ -255,7 +262,9 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
             [(seen.named, "observables", False)],
         )
     if noise and noise.fields:
-        comment = "The vector field sigma pi(x) grad g(x) of each source of noise, in order. params may be NULL."
+        comment = (
+            "For each source of noise, its amplitude sigma times the vector field pi(x) grad g(x). params may be NULL."
+        )
         yield comment, [(noise.fields, "", False)]
     if monitor:
         yield (
@@ -280,8 +289,8 @@ def _of_noise(noise: Noise) -> Sizes:
     names = ", ".join(noise.sources)
     return [
         ("SOURCES", len(noise.sources), f"sources of noise: {names}"),
-        ("DRAWS", noise.draws, "increments of all sources in a step"),
-        ("PARTS", noise.parts, "increments of one source in a step, one for each part of the step"),
+        ("DRAWS", noise.draws, "number of increments of all sources in a step"),
+        ("PARTS", noise.parts, "number of increments of one source in a step, one for each part of the step"),
     ]
 
 
@@ -332,7 +341,13 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         )
     if has["BLOCKS"] and isinstance(lanes, Blocks):
         passes = PASSES if lanes.vectorised and not has["PATH"] else PASSES_OF_CALLS
-        sizes.append(("PASSES", passes, "so many iterations of a block cost as much per step as one evaluation"))
+        sizes.append(
+            (
+                "PASSES",
+                passes,
+                "number of iterations of a block of steps that cost, per step, as much as one evaluation",
+            )
+        )
         if lanes.factors:
             entries = len(lanes.factors.factorise.roots)
             sizes.append(("FACTORS", entries, "entries of the factors of a Newton matrix"))

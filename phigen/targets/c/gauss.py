@@ -56,7 +56,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
             width,
             "number of entries of an array over the stages" + ", to fill a vector" * (width > step.tableau.stages),
         ),
-        ("UNKNOWNS", step.unknowns, "unknowns of a stage"),
+        ("UNKNOWNS", step.unknowns, "number of unknowns of a stage"),
         *([("EARLIER", EARLIER, "number of steps that predictors read")] if isinstance(lanes, Stages) else []),
         *([("LIFT", step.lift.size, "components of frames of group elements")] if step.lift else []),
     ]
@@ -68,7 +68,7 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
         (
             "PLAIN",
             step.plain,
-            "unknowns whose changes are relative to |x|; these come first",
+            "number of unknowns with changes relative to |x|; they come first",
         ),
         (
             "POINT",

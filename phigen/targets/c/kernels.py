@@ -88,8 +88,7 @@ def function(
     form = Form(
         full_name, exported, returning, lanes, single, frozenset(plain_arrays), frozenset(alike), linkage=linkage
     )
-    where = f" in {'one lane' if single else 'all lanes'}" if lanes else ""
-    called = f"{program.name}_{name or kernel.name}{where}"
+    where = f", in {'one lane' if single else 'all lanes'}" if lanes else ""
 
     def after_passes(*, whole: bool) -> ir.Function:
         built = kernel_function(kernel, members(program), named=exported and whole)
@@ -104,7 +103,7 @@ def function(
         built = after_passes(whole=False)
         pieces = cut(built, LONGEST_FUNCTION)
     # The comment of an exported function is in the header, so none is printed here.
-    said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))
+    said = [] if exported else _comment(sentence(kernel.purpose + where))
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if whole:
         return "\n".join([*head, *_body(program, kernel, form, built), *_exponentials(program, kernel), "}"]) + "\n"
@@ -113,7 +112,10 @@ def function(
     for k, piece in enumerate(pieces, 1):
         part = replace(form, name=f"{full_name}_part{k}", workspace=size, exported=False, returning=False)
         part = replace(part, alike=frozenset())
-        lines = [*_comment(f"{called}, part {k} of {len(pieces)}."), _signature(program, kernel, part) + "\n{"]
+        lines = [
+            *_comment(f"{program.name}_{name or kernel.name}{where}, part {k} of {len(pieces)}."),
+            _signature(program, kernel, part) + "\n{",
+        ]
         texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
     head += ["    (void)distinct_coef; /* parts read every lane */"] if alike else []

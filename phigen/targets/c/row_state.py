@@ -32,7 +32,7 @@ LATTICE = (
     ),
     StateBlock(
         "before",
-        members=("double *before[PHI_DIM]; /* copies of the fields, which replace them if a step fails */",),
+        members=("double *before[PHI_DIM]; /* copies of the fields, to restore them if a step fails */",),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(
@@ -75,7 +75,8 @@ LATTICE = (
         "bonds",
         "GRAPH",
         (
-            "int *bonds, *middle;      /* indices in `other` of the first bond that starts, and ends, at each site */",
+            "int *bonds, *middle;"
+            " /* for each site, the index in `other` of the first bond that starts, and that ends, there */",
             "int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */",
         ),
     ),
@@ -113,7 +114,7 @@ LATTICE = (
         "!SERIES",
         (
             "int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */",
-            "size_t full_range; /* number of next steps that use functions for arguments of any size */",
+            "size_t full_range; /* number of next steps that call slower functions, for arguments of any size */",
         ),
     ),
     StateBlock(
@@ -148,7 +149,10 @@ LATTICE = (
     StateBlock(
         "y",
         "SERIES && SLOPES && !ADJOINT",
-        ("double *y[2][PHI_ARRAYS]; /* solution of a stage before and after a sweep, with the parameters at sites */",),
+        (
+            "double *y[2][PHI_ARRAYS];"
+            " /* solution of a stage before and after a sweep (one iteration at all sites); parameters at sites */",
+        ),
     ),
     StateBlock(
         "y",
@@ -344,7 +348,7 @@ ROW = (
     StateBlock(
         "chosen",
         "BY_COLOUR",
-        ("int chosen;                   /* the colour of the sites that a sweep updates */",),
+        ("int chosen;                   /* the flow is that of the terms of H at sites of this colour */",),
         reset=("row.chosen = 0;",),
     ),
     StateBlock(

@@ -22,7 +22,11 @@ from phigen.targets.c.loops import commented, table
 def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     """Return the sizes of a splitting as constants: name, value and comment."""
     constants = [
-        ("ROWS_OF_FLOWS", len(step.schedule.times), "number of rows of coefficients, one for each duration of a flow")
+        (
+            "ROWS_OF_FLOWS",
+            len(step.schedule.times),
+            "number of rows of coefficients, one for each flow and its duration",
+        )
     ]
     constants.append(("ROW", max(1, step.row), "number of coefficients in a row"))
     flows = len(step.schedule.flows_of_run)

@@ -80,12 +80,14 @@ def _path_texts(program: Program, step: Path, lanes: Lanes | None, has: Switches
 
 def _path_constants(program: Program, step: Path) -> Sizes:
     sizes = _max_iterations(step)
-    sizes.append(("TERMS", TERMS, "largest number of Taylor terms of a path; a path that needs more is divided"))
+    sizes.append(
+        ("TERMS", TERMS, "largest number of Taylor terms of a path; a path that needs more is divided into pieces")
+    )
     sizes.append(
         (
             "SERIES",
             len(step.recurrences.series),
-            "number of Taylor series of a path; those of the coordinates come first",
+            "number of Taylor series of a path: of the coordinates, then of intermediate results",
         )
     )
     sizes.append(("FIXED", max(1, len(step.recurrences.fixed)), "number of values that are constant along a path"))

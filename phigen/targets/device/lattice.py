@@ -37,7 +37,7 @@ _ARRAYS = {
     "others": ("const int", "others[b]: the other site of bond b"),
     "at_bonds": ("const double", "at_bonds[n * starts[count] + b]: parameter n at bond b"),
     "colours": ("const int", "colours[i]: the colour of site i"),
-    "colour": ("int", "colour: the colour of the sites that a sweep updates"),
+    "colour": ("int", "colour: the flow is that of the terms of H at sites of this colour"),
     "sums": ("double", "sums[n * count + i]: sum n over the bonds or pairs of site i"),
     "adds": ("int", "adds: 1 if a kernel adds to sums, 0 if it overwrites them"),
 }

@@ -18,8 +18,8 @@ static void phi_direction(const phi_params *params, const double at[PHI_DIM], do
     for (int i = 0; i < PHI_DIM; ++i) direction[i] /= speed;
 }
 
-/* Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in phase space:
-   with steps of equal time, a slow state would leave its neighbourhood. */
+/* Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in phase space.
+   With steps of equal time, a trajectory that starts slowly would soon be far away. */
 static void phi_sample(const phi_params *params, const double x[PHI_DIM], double samples[][PHI_DIM])
 {
     double direction[PHI_DIM], middle[PHI_DIM], length = 0.0;

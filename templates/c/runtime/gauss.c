@@ -95,7 +95,7 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
 }
 
 /* Squared change of the unknowns by a sweep, as a mean over the stages. The first PHI_PLAIN unknowns have the weight
-   `scale`. The others are group elements and have the weight element_scale. */
+   `scale`. The others belong to the matrix or quaternion that moves the state, and have the weight element_scale. */
 static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -120,7 +120,7 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
         for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
-/* Number of the predictor that is nearest to `reads`, the values that the last sweep has read. */
+/* Number of the predictor whose values are nearest to `reads`, the values that the last sweep has read. */
 static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READ_COUNT];
@@ -236,8 +236,8 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
     return sweeps->rising < (int)PHI_NODES + PHI_MOST_RISING ? 0 : -1;
 }
 
-/* Solve the equations of a step for the increments of all stages, by fixed-point sweeps from the prediction. Changes are
-   measured only from the sweep on that is expected to be the last. */
+/* Solve the equations of a step for the increments of all stages, by fixed-point sweeps from the prediction. The
+   change by a sweep is not measured before the sweep that is expected to be the last. */
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     phi_history *past = &s->history;

@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_GAUSS_ALL_UNKNOWNS
 #define PHI_FILE_GAUSS_ALL_UNKNOWNS
 #if PHI_STAGED
-/* Sweeps read and iterate all unknowns. */
+/* Index of the unknown that is number r among those that sweeps read: they read all unknowns. */
 #define PHI_READ(r) (r)
 
 #endif

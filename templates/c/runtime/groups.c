@@ -9,8 +9,8 @@
 
 /* ---- SIMD batches of members: implicit steps ---- */
 enum {
-    PHI_GROUP = PHI_LANES,              /* number of members, one in each lane */
-    PHI_FEWEST = 3,                     /* measured: fewer members are faster one by one */
+    PHI_GROUP = PHI_LANES,              /* number of members of a group, one in each lane */
+    PHI_FEWEST = 3,                     /* smallest number of members that are faster together than one by one; measured */
     PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* number of steps that repay a fit; measured. It is large, since a fit predicts one solution, not eight as in a block */
     PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* slow steps until recurrences that did not help are fitted again */
 };

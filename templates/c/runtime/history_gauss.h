@@ -2,10 +2,11 @@
 #define PHI_FILE_HISTORY_GAUSS_H
 #if PHI_LIFTED
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
-   only, except frame and frame_carry, which belong to the state. Unknowns are offsets from a state. */
+   only, except frame and frame_carry, which belong to the state. Unknowns are offsets from a state. A sweep iterates all stages
+   once. */
 #else
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
-   only. Unknowns are offsets from a state, which is called their frame. */
+   only. Unknowns are offsets from a state, called their frame. A sweep iterates all stages once. */
 #endif
 typedef struct {
     int count;     /* number of steps in the array increments */

@@ -13,6 +13,6 @@ typedef struct {
     int slow_steps;                  /* recent steps that took more than one iteration */
     int slow_steps_allowed;          /* value of slow_steps at which the recurrence is fitted again */
     double past[PHI_STORED_VALUES][PHI_DIM]; /* solutions, the latest last */
-    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* weights of past solutions, the latest first, in the next PHI_AHEAD solutions */
+    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* factors of the past solutions, the latest first, in predictions of the next PHI_AHEAD solutions */
 } phi_history;
 #endif

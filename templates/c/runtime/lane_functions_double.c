@@ -33,7 +33,7 @@ static inline double phi_exp_parts(double u, double *power)
     return *power * sum;
 }
 
-/* exp(u) for loops over lanes. NaN for |u| > 700. */
+/* exp(u) for vectorised loops. NaN for |u| > 700. */
 static inline double phi_exp_lane(double u)
 {
     double power;
@@ -41,7 +41,7 @@ static inline double phi_exp_lane(double u)
     return rest + power + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* exp(u) - 1 for loops over lanes. NaN for |u| > 700. */
+/* exp(u) - 1 for vectorised loops. NaN for |u| > 700. */
 static inline double phi_expm1_lane(double u)
 {
     double power;
@@ -49,7 +49,7 @@ static inline double phi_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* log u for loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
+/* log u for vectorised loops: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
    normal. */
 static inline double phi_log_lane(double u)
 {
@@ -79,7 +79,7 @@ static inline double phi_log_lane(double u)
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
-/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
+/* sin u for vectorised loops: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double phi_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
@@ -113,10 +113,10 @@ static inline double phi_turned_sin(double u, double offset)
 
 #endif
 #if PHI_CALLS_SIN && PHI_CALLS_COS
-/* sin u for loops over lanes. */
+/* sin u for vectorised loops. */
 static inline double phi_sin_lane(double u) { return phi_turned_sin(u, 0.0); }
 
 #endif
-/* cos u for loops over lanes. */
+/* cos u for vectorised loops. */
 static inline double phi_cos_lane(double u) { return phi_turned_sin(u, 0.5); }
 #endif

@@ -27,7 +27,7 @@ static inline float phi_exp_parts(float u, float *power)
     return *power * sum;
 }
 
-/* exp(u) for loops over lanes. NaN for |u| > 87. */
+/* exp(u) for vectorised loops. NaN for |u| > 87. */
 static inline float phi_exp_lane(float u)
 {
     float power;
@@ -35,7 +35,7 @@ static inline float phi_exp_lane(float u)
     return rest + power + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-/* exp(u) - 1 for loops over lanes. NaN for |u| > 87. */
+/* exp(u) - 1 for vectorised loops. NaN for |u| > 87. */
 static inline float phi_expm1_lane(float u)
 {
     float power;
@@ -43,7 +43,7 @@ static inline float phi_expm1_lane(float u)
     return rest + (power - 1.0f) + (fabsf(u) <= 87.0f ? 0.0f : (float)NAN);
 }
 
-/* log u for loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
+/* log u for vectorised loops: u = 2^k m with m between sqrt 1/2 and sqrt 2; branch-free. NaN unless u is positive and
    normal. */
 static inline float phi_log_lane(float u)
 {
@@ -66,7 +66,7 @@ static inline float phi_log_lane(float u)
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
-/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 8192. */
+/* sin u for vectorised loops: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 8192. */
 static inline float phi_sin_lane(float u)
 {
     const float shifted = u * 0.31830987f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
@@ -95,10 +95,10 @@ static inline float phi_turned_sin(float u, float offset)
 
 #endif
 #if PHI_CALLS_SIN && PHI_CALLS_COS
-/* sin u for loops over lanes. */
+/* sin u for vectorised loops. */
 static inline float phi_sin_lane(float u) { return phi_turned_sin(u, 0.0f); }
 
 #endif
-/* cos u for loops over lanes. */
+/* cos u for vectorised loops. */
 static inline float phi_cos_lane(float u) { return phi_turned_sin(u, 0.5f); }
 #endif

@@ -34,15 +34,15 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
 #if PHI_SERIES || PHI_NOISE
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
-   counts the successful steps. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   counts the successful steps. With OpenMP, threads share the sites; the number of threads does not change the bits. */
 #elif PHI_CORRECTED
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
-   counts the successful steps. Each call begins and ends with the flows of the corrector. OpenMP updates rows in
-   parallel, with the same bits for any number of threads. */
+   counts the successful steps. Each call begins and ends with the flows of the corrector. With OpenMP,
+   threads share the sites; the number of threads does not change the bits. */
 #else
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
-   counts the successful steps. The last flow of a step is merged with the first of the next step or call. OpenMP
-   updates rows in parallel, with the same bits for any number of threads. */
+   counts the successful steps. The last flow of a step is merged with the first of the next step or call. With
+   OpenMP, threads share the sites; the number of threads does not change the bits. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
@@ -93,8 +93,8 @@ phi_status phi_kick(phi_solver *s, const double *change);
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. phi_saved writes *full_range and
-   x[array][site], and returns the number of arrays: at most one for each field, or three with compensated steps. To
-   restore, call phi_init, then phi_resume with these values. */
+   x[array][site], and returns the number of arrays: at most PHI_DIM, or 3 PHI_DIM with compensated steps. To restore,
+   call phi_init, then phi_resume with these values. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *full_range);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

@@ -11,7 +11,7 @@ typedef struct {
 } phi_stage;
 
 size_t phi_stages(void);
-phi_status phi_describe(size_t number, phi_stage *about);
+phi_status phi_describe(size_t number, phi_stage *about); /* sets *about for stage `number` */
 
 /* phi_begin computes the coefficients for a step size; call it before the first stage. phi_sweep makes a stage for the
    planes from ... to - 1. With full_range = 1, it uses functions for arguments of any size; with full_range = 0, it

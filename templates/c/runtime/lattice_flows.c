@@ -36,7 +36,8 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 
 #endif
 #if PHI_BY_COLOUR
-/* Apply flows of a step that has one for each colour: 0 first, 1 inner, 2 last, 3 inner in reverse. */
+/* Apply flows of a stage, which has one for each colour. kind: 0 the first, 1 all inner ones, 2 the last, 3 all inner ones
+   in reverse order. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FULL_RANGE)
 {
 #if PHI_TIMED
@@ -76,7 +77,7 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 /* Make some steps. Before the first steps of a run, apply the flows of the corrector; for 0 steps, apply only the flows of
    the corrector at the end of a run. */
 #else
-/* Make steps without the last flow, which the next step includes. For 0 steps, make only the last flow. */
+/* Make steps except the very last flow, which the next step includes. For 0 steps, make only this flow. */
 #endif
 #if PHI_SHARED
 static void phi_shared_steps(const phi_solver *s, size_t steps)
@@ -201,7 +202,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #else
     if (!s->open) phi_to_relative(s, s->x);
     if (!s->open) phi_clear_other_carry(s);
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if s->open, continue before the last flow, which is merged with the next one */
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if s->open, continue from the state before the last flow; the next flow includes it */
 #endif
     status = phi_march(s, steps);
 #if !PHI_NOISE

@@ -14,8 +14,8 @@ enum { PHI_WIDTH = 32 }; /* number of partial results in reductions over sites, 
 
 static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
 
-/* Update the largest change of y by a sweep, and the largest |y|, of each field, by the sites of a row segment. NaN is left
-   out. */
+/* For each field, raise `change` to the largest change of y by a sweep, and `size` to the largest |y|, at the sites of a row
+   segment. NaN is left out. */
 static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
 {
     const phi_row row = phi_piece_of(s, unit);

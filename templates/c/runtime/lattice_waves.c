@@ -64,7 +64,7 @@ static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t cou
     phi_wait();
 }
 
-/* Apply the flows of some steps but for the last flow; the last flow of a step is merged with the first of the next. */
+/* Apply the flows of some steps except for the very last flow. Between two steps, the last flow is merged with the first. */
 static void phi_make_waves(const phi_solver *s, size_t steps)
 {
     const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);

@@ -27,9 +27,9 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The effect of the
-   last correction on the increment is added to first order, without another evaluation. So iterations end if the next
-   correction is expected to be below PHI_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment to x. The last correction of y enters
+   the increment to first order, without another evaluation: iterations end as soon as the next correction is expected to be
+   below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];

@@ -20,8 +20,8 @@ typedef struct {
 
 #include "newton_stages.c"
 
-/* Compute the weight of each component of corrections of y: 1 / (the smallest magnitude of this component of y in all
-   stages), with a bound for small components. The accuracy of solutions is thus relative, as in single steps. */
+/* Compute the weights of the components of corrections of y: unit[i] = 1 / (|y_i| + PHI_FLOOR times the largest |y_j|). If a
+   step has several stages, |y_i| is the smallest of them. */
 static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -64,7 +64,7 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_BLOCK_ROUNDING 1e-10
-#define PHI_CAUTION 32.0 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
+#define PHI_CAUTION 32.0 /* safety margin, since corrections shrink more slowly with reused matrices than with new ones */
 
 /* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the one before.
    The estimate is size^2 after the first correction, later size * size / before with a safety margin, and 0 at rounding

@@ -19,8 +19,8 @@ static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const doubl
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    PHI_EACH_STAGE /* if s->h is NaN, the next step computes the coefficients */
-        phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
+    /* if s->h is NaN, the next step computes the coefficients again */
+    PHI_EACH_STAGE phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
     return 1;
 }
 #endif

@@ -19,7 +19,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return history->order > 0 && distance <= PHI_REACH * size;
 }
 
-/* Update the predictor with a solution; the k-th difference is the error of the prediction of order k. */
+/* Update the predictor with a solution; difference[k] is then the error of a prediction by k entries. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM])
 {
     double least = HUGE_VAL, next[PHI_DIM];

@@ -74,7 +74,7 @@ static int phi_train(phi_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > PHI_ENOUGH * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* the other rows, of the regularisation, are 0 in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8; /* the rows after these belong to the regularisation of later columns, and are 0 here */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
         for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = PHI_RIDGE * largest;

@@ -35,7 +35,11 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
-/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored at open ends. */
+#if PHI_OPEN_ROWS
+/* After a change of the sites from ... to - 1, update the halo: beyond an open end, it mirrors the sites of this end. */
+#else
+/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
+#endif
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
 #if PHI_OPEN_ROWS
@@ -60,8 +64,8 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #if PHI_ONE_ROW
 /* Restrict a row to the sites i with from <= i < to, for a loop over them. */
 #else
-/* Restrict a row to the sites i with from <= i < to. The loop over them is rounded up to whole vectors of 8. Excess sites
-   lie in the halo, which is updated afterwards. */
+/* Restrict a row to the sites i with from <= i < to. Callers may round `to` up to a multiple of 8, for whole SIMD vectors.
+   The sites that this adds lie in the halo, which is updated afterwards. */
 #endif
 static inline const phi_row *phi_between(phi_row *row, ptrdiff_t from, ptrdiff_t to)
 {

@@ -60,7 +60,7 @@ static void phi_find_all_lines(phi_solver *s, double *memory)
     for (size_t r = 0; r < s->rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 }
 
-/* Row number `index`, a work item of threads. */
+/* Row number `index`: the work item of a thread. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 {
     phi_row row;

@@ -22,18 +22,18 @@ static inline phi_row phi_row_of(const phi_solver *s)
 }
 
 #if PHI_GATHER
-enum { PHI_PIECE = 256 }; /* sites of a work item, for any number of threads */
+enum { PHI_PIECE = 256 }; /* number of sites in a segment of the row */
 #else
-enum { PHI_PIECE = 1024 }; /* sites of a work item, for any number of threads */
+enum { PHI_PIECE = 1024 }; /* number of sites in a segment of the row */
 #endif
 
-/* Number of segments of the row. The last is the longest, so that a halo is copied from one segment. */
+/* Number of segments of the row. The last one also has the sites that are left over: no segment is short. */
 static size_t phi_units(const phi_solver *s)
 {
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
 }
 
-/* Segment number `unit` of the row, a work item of threads. */
+/* Segment number `unit` of the row: the work item of a thread. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t unit)
 {
     phi_row row = phi_row_of(s);

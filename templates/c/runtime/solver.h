@@ -53,7 +53,8 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
 #if PHI_MONITOR
-/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). Steps with the same e have the same K. */
+/* As phi_init, with the energy level e = gauge[0] in place of -H(x0). Steps of the same
+   size with the same e are the same map of states. */
 #elif PHI_GAUGE
 /* As phi_init, with a given gauge: steps subtract gauge[k] times Casimir k from H. */
 #endif
@@ -61,8 +62,8 @@ phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double 
     const double gauge[PHI_GAUGES]);
 
 #if PHI_MONITOR
-/* Make one step or many, of size h in tau, which may be negative; s->t increases by their physical time. If a step fails,
-   s->x is the state before it, after s->steps steps. */
+/* Make one step or many. Their size h in tau may be negative; s->t increases by their physical time. If a step fails, s->x
+   is the state before it, after s->steps steps. */
 #else
 /* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
 #endif
@@ -97,7 +98,7 @@ phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const doub
 phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their last good
-   state. status, unless NULL, receives the statuses. Returns the first failure, or OK. */
+   state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
 #if PHI_GROUPS || PHI_PACKS
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 #endif
@@ -110,22 +111,22 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 
-/* phi_ensemble from the time t0 on; phi_ensemble starts at the time 0. */
+/* As phi_ensemble, from the time t0 on; phi_ensemble starts at the time 0. */
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
     unsigned char *status);
 
 #if PHI_TIMED
-/* phi_ensemble for members with parameters params[m], initial time t0[m] and step size h[m]. params may be NULL for the
+/* As phi_ensemble, for members with parameters params[m], initial time t0[m] and step size h[m]. params may be NULL for the
    defaults. */
 #elif PHI_MONITOR
-/* phi_ensemble for members with parameters params[m], energy level gauge[m] and step size h[m]. params may be NULL for the
+/* As phi_ensemble, for members with parameters params[m], energy level gauge[m] and step size h[m]. params may be NULL for the
    defaults, gauge for -H of the initial states. */
 #elif PHI_GAUGE
-/* phi_ensemble for members with parameters params[m], step size h[m], and gauge: gauge[m * PHI_GAUGES + k] is the
-   factor by which Casimir k is subtracted from H. params may be NULL for the defaults, gauge for factors chosen at the
+/* As phi_ensemble, for members with parameters params[m], step size h[m], and gauge: gauge[m * PHI_GAUGES + k] times
+   Casimir k is subtracted from H. params may be NULL for the defaults, gauge for factors chosen at the
    initial states. */
 #else
-/* phi_ensemble for members with separate parameters params[m] and step sizes h[m]. params may be NULL for the defaults. */
+/* As phi_ensemble, for members with separate parameters params[m] and step sizes h[m]. params may be NULL for the defaults. */
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. Arrays must not overlap. */

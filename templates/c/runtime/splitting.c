@@ -8,7 +8,7 @@
 #include "attitude.c"
 #include "flows.h"
 
-/* Compute the coefficients of all flows of a step: a row for each time. */
+/* Compute the coefficients of all flows of a step: a row for each duration. */
 #if PHI_MONITOR
 static void phi_prepare(const phi_params *params, const double gauge[PHI_GAUGES], double h, double *coef)
 #else

@@ -4,7 +4,7 @@
 
 const char *phi_status_string(phi_status status)
 {
-    switch (status) { /* a table would be data that the loader has to relocate */
+    switch (status) { /* a table of pointers would need relocation when the library is loaded */
     case PHI_OK: return "ok";
     case PHI_NO_CONVERGENCE: return "no convergence: the step is too large";
     case PHI_SINGULAR: return "singular Newton matrix: the step is too large";

@@ -121,7 +121,7 @@ class RowLoops:
         """Yield the loop after the passes on the level of sites. Fast code has a second loop, for sites near open
         ends.
         """
-        full_range_doc = f"as {self.program.name}_{loop.name}_near, with full-range functions"
+        full_range_doc = f"as {self.program.name}_{loop.name}_near, for arguments of any size"
         doc = full_range_doc if form == "_full_range" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:

@@ -44,7 +44,9 @@ def declarations(program: Program, step: Sweeps) -> str:
         stages, has = len(program.fractions), switches(layout)
         sizes += [("STAGES", stages, "number of stages of a step")] if stages > 1 else []
         sizes += (
-            [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
+            [("DIRECTIONS", LatticeNewtonPolicy().directions, "largest dimension of a Krylov space of Newton's method")]
+            if has["KRYLOV"]
+            else []
         )
         sizes += (
             [("DIFFERENCES", _differences(program), "number of differences in the predictor of a stage")]
@@ -161,7 +163,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
             said = plain(parameter.description) or ("" if member == parameter.name else parameter.name)
             said = "; ".join(filter(None, [said, "required, because its default is an array"]))
             return f"const double *{member};", f"at {parameter.at}: {said}"
-        return f"const double *{member};", f"at {parameter.at}: {said}; NULL for the default at all of them"
+        return f"const double *{member};", f"at {parameter.at}: {said}; NULL for the default everywhere"
     return f"double {member};", said
 
 
@@ -206,7 +208,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     yield "RESERVED", _reserved(layout, has), "number of arrays over the sites in the memory of a solver"
     if several:
         yield "LINES", len(layout.lines), "number of rows that loops over a row read: the row itself and its neighbours"
-    yield "ROW", max(1, step.row), "number of coefficients of one flow"
+    yield "ROW", max(1, step.row), f"number of coefficients of one {'stage' if step.equation else 'flow'}"
     yield "ROWS_OF_FLOWS", rows_of(step), "number of rows of coefficients"
     if step.refresh:
         yield (
@@ -218,12 +220,16 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         sources = program.noise.sources
         yield "SOURCES", len(sources), f"sources of noise at a site: {', '.join(sources)}"
         yield "DRAWN", program.dimension + len(sites.parameters), "index of the first array of increments of noise"
-        yield "PARTS", program.noise.parts, "increments of one source in a step, one for each part of the step"
+        yield (
+            "PARTS",
+            program.noise.parts,
+            "number of increments of one source in a step, one for each part of the step",
+        )
     if step.equation:
         yield (
             "SIDES",
             2 if layout.slopes else 3,
-            "arrays of y: before and after a sweep" + ", and varied" * (not layout.slopes),
+            "number of arrays for y: before and after a sweep" + ", and varied" * (not layout.slopes),
         )
         yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
@@ -256,7 +262,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     if has["WAVES"]:
         distances = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *distances) if several else 1
-        yield "SPAN", span, "slices that a flow reads on each side of a slice, for wavefront blocking"
+        yield "SPAN", span, f"number of slices that a flow reads on each side of a slice: see {program.name}_slices"
     if layout.lattice.weights and several:
         yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that reach beyond open ends"
     if sites.colours > 1:

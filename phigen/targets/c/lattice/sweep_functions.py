@@ -150,7 +150,7 @@ class _PartLoops:
                 cases.append(self._segment(k, forms, names))
                 continue
             for form in sorted(forms):
-                title = f"The flow of H_{k + 1}" + ", with full-range functions" * (form == "_full_range")
+                title = f"The flow of H_{k + 1}" + ", for arguments of any size" * (form == "_full_range")
                 case = self._segment(k, {form: forms[form]}, names)
                 yield commented(build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]), program)
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
@@ -158,7 +158,7 @@ class _PartLoops:
             cases.append(row_drivers.in_forms(blocks))
         if step.relative:
             yield self._gathering(step.relative.remainder, threads)
-        title = "a flow of the step, chosen by its number" if coloured else "the flow of a part of H"
+        title = "flow number `flow` of a stage" if coloured else "the flow of a part of H"
         title = f"Derivative of {title} along a tangent vector" if self.varied else title[0].upper() + title[1:]
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
@@ -387,8 +387,8 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
 
 _TITLES = {
     Role.RELAX: "A sweep over y, or the update of x at the end of a stage",
-    Role.SLOPE: "Derivative of a sweep by y along v",
-    Role.OWN_SLOPE: "Derivative of a sweep by y at the site itself",
-    Role.SIDE: "Derivative of a sweep by x along v",
-    Role.FOLLOW: "Derivative of the update of x at the end of a stage by y along v; it is added",
+    Role.SLOPE: "Derivative of a sweep with respect to y, along v",
+    Role.OWN_SLOPE: "Derivative of a sweep with respect to y at the site itself",
+    Role.SIDE: "Derivative of a sweep with respect to x, along v",
+    Role.FOLLOW: "Derivative of the update of x at the end of a stage with respect to y, along v; it is added",
 }
