@@ -224,7 +224,10 @@ def shown(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
         (r["title"], str(r["order"]), f"{r['by hand']:.3g}", f"{r['generated']:.3g}",
          f"{r['generated'] / r['by hand']:.2f}") for r in found["kernels"]
     ]  # fmt: skip
-    text = f"Time for a site and step, the least of alternating runs.\n\n{table(head, first)}\n"
+    text = (
+        "Processor time of a step for each site. Runs of both programs alternate, and the smallest time counts."
+        f"\n\n{table(head, first)}\n"
+    )
     head = (
         "method",
         "h",
