@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 561dc165ebf2e7763e23b17af8320cd3b54251eeb0749c400382c75b3c03ef33
+ * body-sha256: d379da66c219787a95623ade1cf209d4c1dc13f790c664c99565265cffb932d7
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -14,7 +14,7 @@ extern "C" {
 #define food_web_ORDER 4
 #define food_web_CASIMIRS 0
 #define food_web_PHIGEN_VERSION "0.1.0"
-#define food_web_SPEC_SHA256 "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
+#define food_web_SPEC_SHA256 "5659ee78a2bc4bebf3fe67f5487d8c66f8f2a25268cffd5580783f1fe03a2f6f"
 
 typedef struct {
     const double *A; /* at bonds: strength of the interaction; NULL for the default everywhere */

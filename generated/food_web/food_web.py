@@ -6,11 +6,11 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5bc46f147a23cc47ebab0d025da20110a1930b594717e47a135dbc4a9e4af246
+# body-sha256: 8e73218baaad79ab962e24922a2cbd132a2fa40edf99d3c3528b62c985bf46dc
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
+SPEC_SHA256 = "5659ee78a2bc4bebf3fe67f5487d8c66f8f2a25268cffd5580783f1fe03a2f6f"
 DIM = 1
 ORDER = 4
 AXES = ("i",)

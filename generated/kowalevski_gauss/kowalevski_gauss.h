@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d0dd200b0ef3e507f9ddfb073f02b171729acdc635bc6f31afda29b1139792b8
+ * body-sha256: d3b97bcfdc04335b1a4a0d0635fe7f4bbb6e552812ef0a3d2f3e4999c3a093a9
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -13,7 +13,7 @@ extern "C" {
 #define kowalevski_gauss_ORDER 16   /* order of the method */
 #define kowalevski_gauss_CASIMIRS 2 /* Casimirs: A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
-#define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
+#define kowalevski_gauss_SPEC_SHA256 "bdf54c6d3cfbb5eec085af6ef97624c185d4e5c3d6c2052a92a705496cdfa343"
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* number of coefficients: functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* number of stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* number of entries of an array over the stages */

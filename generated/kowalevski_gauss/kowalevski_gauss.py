@@ -6,11 +6,11 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8280ccd3716b6ce634a0291bff032b99a00b05f8b14f86de26d41fbd9c773384
+# body-sha256: 3a12668736dc698c0bfa9668f49904bf83b75ec3e0ad1ec7eb300c3707255030
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
+SPEC_SHA256 = "bdf54c6d3cfbb5eec085af6ef97624c185d4e5c3d6c2052a92a705496cdfa343"
 DIM = 6
 ORDER = 16
 COORDINATES = ("P1", "P2", "P3", "G1", "G2", "G3",)

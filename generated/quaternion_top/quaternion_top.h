@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 71395a3fae302d89db33dcd612b4c052237fe62e1bc4b9c4da59a8af14a12026
+ * body-sha256: df20162c88bd09bc81241cc5353476985a5a1fa44b912d956163766bb6fccb4f
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -13,7 +13,7 @@ extern "C" {
 #define quaternion_top_ORDER 4    /* order of the method */
 #define quaternion_top_CASIMIRS 1 /* Casimirs: length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
-#define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
+#define quaternion_top_SPEC_SHA256 "700546472243a76056288ba748c5fa272452573e41bbf16315339d7dc615c693"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* number of coefficients: functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
 enum { quaternion_top_DIFFERENCES = 9 }; /* entries of the predictor; more would amplify rounding errors */

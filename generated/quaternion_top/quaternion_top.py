@@ -8,11 +8,11 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 46a1c0729c4ce03ce461b98621bcabdcaf1cf3033d141192adfec5ce04535256
+# body-sha256: d7976c4f29e03d105886de0d13f0fdc0b9e71a3199203783e41469ad922b1118
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
+SPEC_SHA256 = "700546472243a76056288ba748c5fa272452573e41bbf16315339d7dc615c693"
 DIM = 7
 ORDER = 4
 COORDINATES = ("m1", "m2", "m3", "w", "x", "y", "z",)

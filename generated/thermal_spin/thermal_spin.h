@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e4f642466dd6a6389d99e0f6b9b6c36e72f8c1773c11fa8fb040acfd1dfef439
+ * body-sha256: 20b97814e027410751294755066c3994e81e77394fe455fcb563cd840769198f
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -14,7 +14,7 @@ extern "C" {
 #define thermal_spin_ORDER 2    /* order of the method */
 #define thermal_spin_CASIMIRS 1 /* Casimirs: length */
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
-#define thermal_spin_SPEC_SHA256 "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
+#define thermal_spin_SPEC_SHA256 "c2605a05b4723f47754072482f3271466da9eaeb4a192c560cd7dc077895ddeb"
 /* number of coefficients: functions of params and h, and of the noise */
 enum { thermal_spin_COEFFICIENTS = 13 };
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */

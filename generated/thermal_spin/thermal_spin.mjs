@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 641616e67b40eb5d5c3a34c2878453c632e85ea0986727cbbe91508cd78ae968
+ * body-sha256: 525a547840156af3f9799df919bbf4717b22b7c4d92a6e66b749ec645d732528
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -27,7 +27,7 @@
 
 const NAME = "thermal_spin";
 const VERSION = "0.1.0";
-const SPEC_SHA256 = "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d";
+const SPEC_SHA256 = "c2605a05b4723f47754072482f3271466da9eaeb4a192c560cd7dc077895ddeb";
 const DIM = 3;
 const ORDER = 2;
 const COORDINATES = Object.freeze(["x", "y", "z"]);

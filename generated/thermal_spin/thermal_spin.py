@@ -12,11 +12,11 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d21e00db0071e5e1ff5089ad06347d663bd5a0a45477fd9335eb297a253117f5
+# body-sha256: 114305bb82f6696e173c3d063a8be58b0147a4f4750f325e55ec65709b29bd50
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
+SPEC_SHA256 = "c2605a05b4723f47754072482f3271466da9eaeb4a192c560cd7dc077895ddeb"
 DIM = 3
 ORDER = 2
 COORDINATES = ("x", "y", "z",)
