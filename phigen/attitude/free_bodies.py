@@ -86,9 +86,9 @@ def _matrix(group: Group, q: Vector) -> list[Expression]:
 
 @dataclass(frozen=True)
 class _SortedAxes:
-    """The momentum x and the inverse moments w of a rigid body, with components in the order l, m, h of increasing E_i.
+    """The momentum ``x`` and the inverse moments ``weights`` of a rigid body.
 
-    ``square`` is L² = |x|², ``inverse`` is 1/L². The formulas are those of this module.
+    Their components are in the order l, m, h of the text of this module. ``square`` is L² = |x|², ``inverse`` is 1/L².
     """
 
     x: Vector

@@ -359,10 +359,10 @@ def _residuals(
 ) -> Iterator[tuple[str, Expression]]:
     """Yield residuals that are 0 if a step conserves the momentum.
 
-    The momentum is taken in the frame in which it is constant. A residual is the momentum, or a rotated vector, after
-    the step minus its value before the step. It is multiplied by |g₀|²|τ|², for the quaternions g₀ of the attitude
-    before the step and τ of the attitude increment. For se(3) the residuals of the angular momentum are computed for g₀
-    = 1, and are multiplied by |τ|⁴.
+    A residual is a vector after the step minus the same vector before the step, both in the frame in which the vector
+    is constant. The vectors are those that rotate with the body, or the momentum if the group has no such vectors. Let
+    g₀ be the quaternion of the attitude before the step, and τ that of the attitude increment. Residuals are multiplied
+    by |g₀|²|τ|². For se(3), those of the angular momentum are computed for g₀ = 1 and multiplied by |τ|⁴.
     """
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)

@@ -73,11 +73,11 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """Yield comparisons of both derivations: first of S_1 … S_``terms``, then of ∇S_h, α and β.
+    """Yield comparisons of phigen's formulas with those that sympy derives: S_1 … S_``terms``, then ∇S_h, α and β.
 
-    By default, all terms of the method are compared. ∇S_h of the program is compared only if no further S_i is needed
-    for it. If steps follow paths, α and β have no closed form, and are compared only through the S_i. Raises
-    `LimitError` after ``seconds``, or if a polynomial has too many terms.
+    By default, all terms of the method are compared. ∇S_h is compared only if it needs no further S_i. If steps follow
+    paths, α and β have no closed form, and are compared only through the S_i. Raises `LimitError` after ``seconds``, or
+    if a polynomial has too many terms.
     """
     terms = terms or compilation.stage.terms
     derivation: _Derivation | None = None

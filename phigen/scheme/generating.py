@@ -28,10 +28,10 @@ from phigen.symbolic.symbols import LEVEL, STEP
 class GeneratingFunction:
     """The generating function of a step as expressions: ``slope`` is ∇S_h and ``hessian`` the full n×n matrix Hess S_h.
 
-    ``form`` names the form in which they are written, and ``terms`` is the number of terms of a polynomial.
-    ``coefficients`` is the table of the symbols ``c:k`` in the expressions, including coefficients that are computed
-    anew in every step. For a monitored system ``elapsed`` is the time that a step takes, ∂S_h/∂e with the energy level
-    e. With a covector force ζ, ``slope`` includes hζ, and ``free`` is the same covector without the forces.
+    ``form`` says in words how the expressions are written, for instance as polynomials, with ``terms`` terms.
+    ``coefficients`` is the table of the symbols ``c:k`` in the expressions. It includes coefficients that every step
+    computes anew. For a monitored system, ``elapsed`` is the duration of a step, ∂S_h/∂e with the energy level e. If
+    the spec has a force field ζ, which is added to ∇H, then ``slope`` is ∇S_h + hζ, and ``free`` is ∇S_h.
     """
 
     slope: tuple[Expression, ...]
