@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 99dec583e83163618cb85e9f347180065bd4395b9d2f77b433fe82b1de4ee274
+ * body-sha256: e5a78f710338756e4fe2ad2b5da4572daa2736881c2cfe65a2f53945816e9672
  */
 #include "duffing.h"
 #include <float.h>
@@ -339,7 +339,7 @@ static void duffing_renew(duffing_solver *s)
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 18934e6172bf9b07dcb17b03369938f4d98ae6b61d581ca951f7d6ebbddda235
+ * body-sha256: c3cdbecb05f6dbca1cf8f55233f5ec18968dcf5d90d5d42e01d40b7c31172e6e
  */
 #include "food_web.h"
 #include <limits.h>
@@ -264,7 +264,8 @@ static int food_web_connected(const food_web_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. */
+/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. used_by
+   is memory: for each colour, the last site with an earlier neighbour of this colour. */
 static void food_web_colour(food_web_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;

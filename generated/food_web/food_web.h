@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d379da66c219787a95623ade1cf209d4c1dc13f790c664c99565265cffb932d7
+ * body-sha256: 66541bafb0f960abd433ad05ac639baa0454023bbc7964a2bcb4f35e809f37a0
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -41,8 +41,8 @@ typedef struct {
     double *x[food_web_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[food_web_DIM]; /* copies of the fields, to restore them if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    /* for each site, the index in `other` of the first bond that starts, and that ends, there */
-    int *bonds, *middle;
+    int *bonds; /* for each site, the index in `other` of the first bond that starts there */
+    int *middle; /* for each site, the index in `other` of the first bond that ends there */
     int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: c06882918a59ffad5882bad93b37d8b27d7d1a87a87e276e5ed029faade76562
+ * body-sha256: af55e036e84437e8add99f83e492c6816899662fb52b83269556327259f75dde
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -466,7 +466,7 @@ enum {
 #define guiding_centre_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to
-   have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute
+   have converged: it has gaps between its terms, such as t + t^9, or extends across the kink of an absolute
    value. */
 static int guiding_centre_holds(const double *coef, const double p[guiding_centre_DIM],
     const double m[guiding_centre_DIM], const double slope[guiding_centre_DIM])
@@ -543,9 +543,8 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
     return 0;
 }
 
-/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
-   change of x along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be
-   followed. */
+/* For the path from s->x with the covector p, compute its mean y, the residual p - grad S_h(y), the change of
+   x along the path, and an approximate Jacobian of the residual. Returns 0 if guiding_centre_path fails. */
 static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], double y[guiding_centre_DIM], double residual[guiding_centre_DIM],
     double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM],
@@ -638,7 +637,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 5a01018a12ca1109f66cf1d3574f3df5708329b12367de0d15b4b826c0e5e1de
+ * body-sha256: 47022775101259fdcb87505280c7649843ed2d9c051439a66a6ae9cebf7c3cd7
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -652,7 +652,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);

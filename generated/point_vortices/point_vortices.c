@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: ca9860be666481cd90f151fb9376d78435ca231703d9687b9105621c93f958c4
+ * body-sha256: c30af41648f0dc1230fa81fda1e1dabc63067bdbe157eb00617c0e3ca305251e
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -501,8 +501,8 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
         }
 }
 
-/* Update the predictor with the solution y of a stage. The error of the prediction of order d is the d-th
-   difference; the order with the smallest error is used next. */
+/* Update the predictor with the solution y of a stage that began at `from`. The error of the prediction of
+   order d is the d-th difference; the order with the smallest error is used next. */
 static void point_vortices_remember(point_vortices_solver *s, double *const *from, int stage, int now)
 {
     point_vortices_predictor *predictor = &s->predictor[stage];
@@ -679,9 +679,9 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
-/* Solve the equation of a stage for y to rounding level, from the prediction in s->y[0]: by fixed-point
-   sweeps or, if s->stiff, by Newton corrections, whose result must not be farther than range from x. The
-   solution is s->y[*now]. */
+/* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now].
+   The method is fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther than range from
+   x are then refused. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
     int *now)
 {
@@ -695,8 +695,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* stop if further sweeps, at the rate change / before, would change too little, or at rounding
-           level */
+        /* stop at rounding level, or if further sweeps would change too little at the rate change / before */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
             && change <= point_vortices_ROUNDING && count > 0))
             return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,

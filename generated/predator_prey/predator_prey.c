@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: d7169e96cc71579571fbfdd63b099933a833b2636b84599a6f3aa8541704c7bb
+ * body-sha256: d7a3cf7c230eee1aba7bea289aba538115f583c00ae656c2f3e81ff233224dad
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -306,7 +306,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: f9e6f481ed6ec3dbab8fb6cc0cee57d486a12a88bbb9d59cbb91a6a11032476b
+ * body-sha256: 25f0df76f1b86eaa3a9206955edf1bdc461dc548ffa3ec5e8b7fd63b80362edc
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -698,7 +698,7 @@ enum {
 #define quaternion_top_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to
-   have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute
+   have converged: it has gaps between its terms, such as t + t^9, or extends across the kink of an absolute
    value. */
 static int quaternion_top_holds(const double *coef, const double p[quaternion_top_DIM],
     const double m[quaternion_top_DIM], const double slope[quaternion_top_DIM])
@@ -775,9 +775,8 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
     return 0;
 }
 
-/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
-   change of x along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be
-   followed. */
+/* For the path from s->x with the covector p, compute its mean y, the residual p - grad S_h(y), the change of
+   x along the path, and an approximate Jacobian of the residual. Returns 0 if quaternion_top_path fails. */
 static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], double y[quaternion_top_DIM], double residual[quaternion_top_DIM],
     double change[quaternion_top_DIM], double jacobian[quaternion_top_DIM * quaternion_top_DIM],
@@ -891,7 +890,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 4a8c2f944cfa32fa4707ac6a14b1d53c3683c558f99fd45402d172d6c9cab83f
+ * body-sha256: 834931ad10376e81d08c2663bef71d890ecdd293ac9e5f6cbe6d4cd89518348b
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -872,7 +872,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
+/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -1565,7 +1565,8 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    /* after so many steps in blocks, the fits have paid off; also the first wait after recurrences failed */
+    /* number of steps in blocks that repay the fits; also the first number of steps without recurrences that
+       failed */
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
     rigid_body_MOST_SINGLE_STEPS = 1000, /* largest number of single steps after a failed block */
     /* recurrences are abandoned if a failed block leads to more single steps than this */

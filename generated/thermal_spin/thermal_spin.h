@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 20b97814e027410751294755066c3994e81e77394fe455fcb563cd840769198f
+ * body-sha256: c7f97d07052104994cedc95f41289a68df16970a56beaf7daee2818ab501eeef
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -35,8 +35,8 @@ double thermal_spin_hamiltonian(const thermal_spin_params *params, const double 
 void thermal_spin_casimirs(const thermal_spin_params *params, const double x[3], double out[]);
 void thermal_spin_vector_field(const thermal_spin_params *params, const double x[3], double out[3]);
 
-/* For each source of noise, its amplitude sigma times the vector field pi(x) grad g(x). params may be
-   NULL. */
+/* For each source of noise with the amplitude sigma and the Hamiltonian g: the vector field sigma pi(x) grad
+   g(x). params may be NULL. */
 void thermal_spin_noise_fields(const thermal_spin_params *params, const double x[3], double out[9]);
 
 typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR,

@@ -441,9 +441,8 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
     needed = set(topological([v for o in outputs for v in o.values]))
     named = tuple((name, value) for name, value in kernel.named if value in needed)
-    purpose = (
-        "at the point y, with the momenta p = grad S_h(y): the displacement alpha - y and the increment beta - alpha"
-    )
+    where = kernel.purpose.partition(":")[0]
+    purpose = f"{where}: the displacement alpha - y and the increment beta - alpha"
     return replace(kernel, name="evaluate", purpose=purpose, outputs=outputs, named=named)
 
 

@@ -204,7 +204,8 @@ def _facts(
     symmetry = "symmetric" if realisation.symmetric else "not symmetric"
     yield f"bi-realisation (alpha, beta): {realisation.kind}, {symmetry}; steps from alpha(y, p) to beta(y, p)"
     yield from approximation(realisation)
-    yield f"generating function: p = grad S_h(y), S_h = {series} ({generating.form}{terms})"
+    momenta = "" if system.forces else "p = grad S_h(y), "
+    yield f"generating function: {momenta}S_h = {series} ({generating.form}{terms})"
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
     g = "g " * bool(gauge.monitor)

@@ -100,8 +100,8 @@ def linearise_kernel(
     equations = tuple((momentum(c), e) for c, e in zip(coordinates, flat[sum(sizes) :], strict=True))
     return Kernel(
         "linearise",
-        "at the point y, with the momenta p = grad S_h(y): the displacement alpha - y, the increment beta - alpha, the "
-        "Jacobian of alpha, and the Jacobian of the increment",
+        f"at the point y, with the momenta p{'' if system.forces else ' = grad S_h(y)'}: the displacement alpha - y, "
+        "the increment beta - alpha, the Jacobian of alpha, and the Jacobian of the increment",
         {"coef": coefficients.slots, "y": coordinates},
         outputs,
         equations,
@@ -270,7 +270,7 @@ def noise_fields(system: System) -> Kernel:
     """Return the kernel of the vector fields σ π∇g of all sources of noise, one after the other."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
-    purpose = "for each source of noise, its amplitude sigma times the vector field pi(x) grad g(x)"
+    purpose = "for each source of noise with the amplitude sigma and Hamiltonian g: the vector field sigma pi grad g"
     return Kernel("noise_fields", purpose, system_inputs(system), (Output("out", values),))
 
 

@@ -263,7 +263,8 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
         )
     if noise and noise.fields:
         comment = (
-            "For each source of noise, its amplitude sigma times the vector field pi(x) grad g(x). params may be NULL."
+            "For each source of noise with the amplitude sigma and the Hamiltonian g: the vector field"
+            " sigma pi(x) grad g(x). params may be NULL."
         )
         yield comment, [(noise.fields, "", False)]
     if monitor:

@@ -75,8 +75,8 @@ LATTICE = (
         "bonds",
         "GRAPH",
         (
-            "int *bonds, *middle;"
-            " /* for each site, the index in `other` of the first bond that starts, and that ends, there */",
+            "int *bonds;  /* for each site, the index in `other` of the first bond that starts there */",
+            "int *middle; /* for each site, the index in `other` of the first bond that ends there */",
             "int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */",
         ),
     ),

@@ -36,7 +36,8 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. */
+/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. used_by is memory: for
+   each colour, the last site with an earlier neighbour of this colour. */
 static void phi_colour(phi_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;

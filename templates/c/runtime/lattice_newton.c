@@ -60,8 +60,8 @@ static double phi_range(phi_solver *s, const double *coef)
 }
 
 
-/* Solve the equation of a stage for y to rounding level, from the prediction in s->y[0]: by fixed-point sweeps or, if
-   s->stiff, by Newton corrections, whose result must not be farther than range from x. The solution is s->y[*now]. */
+/* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now]. The method is
+   fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther than range from x are then refused. */
 static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_RANGE, double range, int *now)
 {
     double before = 0.0;
@@ -72,7 +72,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* stop if further sweeps, at the rate change / before, would change too little, or at rounding level */
+        /* stop at rounding level, or if further sweeps would change too little at the rate change / before */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
             return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
         if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > PHI_NEARLY_SETTLED) break;

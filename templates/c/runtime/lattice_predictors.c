@@ -18,7 +18,7 @@ static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
         }
 }
 
-/* Update the predictor with the solution y of a stage. The error of the prediction of order d is the d-th difference;
+/* Update the predictor with the solution y of a stage that began at `from`. The error of the prediction of order d is the d-th difference;
    the order with the smallest error is used next. */
 static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, int now)
 {

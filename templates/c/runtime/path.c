@@ -15,7 +15,7 @@
 #include "path_policy.h"
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to have converged:
-   it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
+   it has gaps between its terms, such as t + t^9, or extends across the kink of an absolute value. */
 static int phi_holds(const double *coef, const double p[PHI_DIM], const double m[PHI_DIM],
     const double slope[PHI_DIM])
 {
@@ -86,8 +86,8 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
     return 0;
 }
 
-/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the change of x along
-   the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
+/* For the path from s->x with the covector p, compute its mean y, the residual p - grad S_h(y), the change of x along the
+   path, and an approximate Jacobian of the residual. Returns 0 if phi_path fails. */
 static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DIM], double y[PHI_DIM],
     double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
