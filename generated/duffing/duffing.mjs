@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b12c1c7ffaac6d7d88fafa3b761f2f2ccbb3f309bdf823f23f954927eaea3f96
+ * body-sha256: 4556c14e4b83e8d0eb87c89b381a0e96b4062910365a433180e4c0b434a6182f
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -241,7 +241,7 @@ function finite(values, length, what) {
  */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;
@@ -264,7 +264,8 @@ function admitted(overrides) {
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
-    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    const needed = POSITIVE.includes(name) ? "a finite positive number" : "a finite number";
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
   }
   const [table] = emptyTables();
   prepareProbe(params, table);
@@ -324,7 +325,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
       prepareStage(this, fraction * h, this.coef[stage]);

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bb2093a9ab68786cc21104b714fe27140890af3e782617399b8220c57e966a59
+ * body-sha256: 77518a47667d14d05e5e11e311e576a6ae4c4c2400ddd8043262f17d43c53ed8
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -127,7 +127,7 @@ function finite(values, length, what) {
  */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;
@@ -150,7 +150,8 @@ function admitted(overrides) {
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
-    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    const needed = POSITIVE.includes(name) ? "a finite positive number" : "a finite number";
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
   }
   const [table] = emptyTables();
   prepareProbe(params, table);
@@ -206,7 +207,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
       prepareStage(this, fraction * h, this.coef[stage]);

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2c3c8a55a969563dbcf6fd10608616005eb302fa79afa35fcd0cab2d47196761
+ * body-sha256: 3a7bfcae02da4901f44a7270ccb21c31dea05ea87bfa6b952dea0ef494a686e3
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -539,7 +539,7 @@ function finite(values, length, what) {
  */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;
@@ -562,7 +562,8 @@ function admitted(overrides) {
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
-    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    const needed = POSITIVE.includes(name) ? "a finite positive number" : "a finite number";
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
   }
   const [table] = emptyTables();
   prepareProbe(params, table);
@@ -613,8 +614,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
-   * @param {ArrayLike<number>} [options.gauge] the Casimirs, times these factors, are subtracted from H; by default
-   *   the factors follow from x0. All steps with the same factors have the same Hamiltonian
+   * @param {ArrayLike<number>} [options.gauge] the Casimirs, times these factors, are subtracted from H;
+   *   by default the factors follow from x0. All steps with the same factors have the same Hamiltonian
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);
@@ -625,7 +626,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
       prepareStage(this, fraction * h, this.coef[stage]);

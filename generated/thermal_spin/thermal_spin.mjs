@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d81cb4689a8a4e9f65c24d26c19edd9cf5d89ed3a1bc5b6d4aad3662d23e92dc
+ * body-sha256: 032154eb0da80120d29e5466331c30ec0079c062523634db548f889bc1f9d830
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -339,7 +339,7 @@ function finite(values, length, what) {
  */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;
@@ -362,7 +362,8 @@ function admitted(overrides) {
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
-    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    const needed = POSITIVE.includes(name) ? "a finite positive number" : "a finite number";
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
   }
   const [table] = emptyTables();
   prepareProbe(params, table);
@@ -430,7 +431,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
       prepareStage(this, fraction * h, this.coef[stage]);
@@ -774,7 +777,7 @@ function twoNormals(counter, key) {
 function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
     if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
-      throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
+      throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}, not 0, 1, 2, …`);
     }
   }
   return { seed, member, step0 };
@@ -817,7 +820,8 @@ function draw(solver, increments) {
 /** Set the increments of the noise in the next step. Throws StepError if `increments` is not admissible. */
 function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
-  throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
+  const message = `${DRAWS} finite increments are needed, not ${increments}`;
+  throw new StepError("BAD_ARGUMENT", solver.steps, message);
 }
 
 /** Compute the vector fields of the sources of noise at x; they do not depend on the time t. */

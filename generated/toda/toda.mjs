@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7bdd8cdb0740291fbee441e92b0e360e30c6d66477d5c74deefb6389007a7a9f
+ * body-sha256: e62e74155f5394ef654c743787690ce0161da99eb10239e96c9379c0c2e3eba0
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -191,7 +191,7 @@ function finite(values, length, what) {
  */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;
@@ -291,7 +291,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     prepareStep(this.params, h, this.rows);
     this.past = {};
@@ -440,7 +442,8 @@ class Sites {
       const listed = typeof value === "object" && length !== undefined;
       const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
-        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+        const needed = POSITIVE.includes(name) ? "finite and positive" : "finite";
+        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
       }
       params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);
     }

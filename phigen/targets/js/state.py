@@ -118,7 +118,7 @@ SOLVER = (
             Option(
                 "gauge",
                 "ArrayLike<number>",
-                "the Casimirs, times these factors, are subtracted from H; by default\nthe factors follow from x0. "
+                "the Casimirs, times these factors, are subtracted from H;\nby default the factors follow from x0. "
                 "All steps with the same factors have the same Hamiltonian",
             ),
         ),

@@ -127,7 +127,9 @@ export class Solver {
 
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     prepareStep(this.params, h, this.rows);
     this.past = {};

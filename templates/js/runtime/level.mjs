@@ -21,7 +21,7 @@ export function rateAt(params, x) {
 export function expectPassingTime(solver) {
   const rate = rateAt(solver.params, solver.x);
   if (Number.isFinite(rate) && rate > 0 && Number.isFinite(solver.gauge[0])) return;
-  throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
+  throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0, not positive`);
 }
 
 /** Convert a vector field at x from dx/dt to dx/dtau, where t is the physical time. */

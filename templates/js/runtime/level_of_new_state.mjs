@@ -9,7 +9,7 @@ import { FRACTIONS, prepare } from "./model.mjs";
 export function takeLevel(solver, x) {
   const [rate, level] = [rateAt(solver.params, x), chooseGauge(solver.params, x)];
   if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(level[0]))) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the monitor is ${rate} there`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the monitor is ${rate} at this state, not positive`);
   }
   solver.gauge = level;
   if (!Number.isFinite(solver.h)) return;

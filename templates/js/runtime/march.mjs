@@ -7,7 +7,7 @@ import { StepError } from "./errors.mjs";
  */
 export function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
-    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
   }
   for (let k = 0; k < count; k++) makeStep();
   return solver;

@@ -36,5 +36,6 @@ function draw(solver, increments) {
 /** Set the increments of the noise in the next step. Throws StepError if `increments` is not admissible. */
 export function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
-  throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
+  const message = `${DRAWS} finite increments are needed, not ${increments}`;
+  throw new StepError("BAD_ARGUMENT", solver.steps, message);
 }

@@ -54,7 +54,7 @@ export function twoNormals(counter, key) {
 export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
     if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
-      throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
+      throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}, not 0, 1, 2, …`);
     }
   }
   return { seed, member, step0 };

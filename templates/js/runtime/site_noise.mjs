@@ -28,5 +28,5 @@ export function drawAtSites(solver, part) {
 
 /** Throw StepError unless step0 fits its field of 48 bits in the counter of the random numbers. */
 export function expectFewSteps({ step0 }) {
-  if (step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${step0}`);
+  if (step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${step0}, not below 2^48`);
 }

@@ -123,11 +123,12 @@ export class Sites {
       const listed = typeof value === "object" && length !== undefined;
       const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
-        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+        const needed = POSITIVE.includes(name) ? "finite and positive" : "finite";
+        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
       }
       // #if NONNEGATIVE
       if (NONNEGATIVE.includes(name) && values.some((v) => v < 0)) {
-        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+        throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, which is negative`);
       }
       // #endif
       params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);

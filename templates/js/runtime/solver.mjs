@@ -37,7 +37,8 @@ function admitted(overrides) {
   if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
   for (const [name, value] of Object.entries(params)) {
     const allowed = Number.isFinite(value) && (value > 0 || !POSITIVE.includes(name));
-    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
+    const needed = POSITIVE.includes(name) ? "a finite positive number" : "a finite number";
+    if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}, not ${needed}`);
     expectNonnegative(name, value);
   }
   const [table] = emptyTables();
@@ -85,7 +86,9 @@ export class Solver {
   // #members attitude
   /** Compute the coefficients for a step size, if it has changed. */
   #setStep(h) {
-    if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
+    if (!Number.isFinite(h)) {
+      throw new StepError("BAD_ARGUMENT", this.steps, `the step size is ${h}, not finite`);
+    }
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
       prepareStage(this, fraction * h, this.coef[stage]);
