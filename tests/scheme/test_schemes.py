@@ -84,7 +84,7 @@ def test_splittings_refuse_settings_of_the_inner_solve(setting):
     text = BODY.replace(" + x1**3/9", "")
     refusal = attempted(f"{text}solver: {{{setting}}}\n", "splitting")
     assert f"solver: {setting.partition(':')[0]} belongs to steps that solve equations" in str(refusal)
-    assert f"hint: remove {setting.partition(':')[0]}, or the scheme" in str(refusal)
+    assert f"hint: remove {setting.partition(':')[0]}, or remove scheme:" in str(refusal)
     compile_text(f"{text}scheme: splitting\n")
 
 
