@@ -27,9 +27,10 @@ _LANES = ir.Pointer(constant=False, lanes=True)
 class FlowFunctions:
     """The functions of the flows of a splitting, for a single trajectory.
 
-    A flow updates ``along`` values. The first ``dimension`` values are the coordinates. With a monitor, two further
-    values follow: the physical time of the step, and a sum that is NaN if the step is not defined. With ``turns``, a
-    flow also updates the attitude, a group element. With ``stores``, the state is stored on a tape before each flow.
+    A flow updates an array of ``along`` values. The first ``dimension`` values are the coordinates. With a monitor, two
+    further values follow: the physical time of the step, and a sum of square roots that is NaN if the step is not
+    defined (`phigen.scheme.logarithmic`). With ``turns``, a flow also updates the attitude, a group element. With
+    ``stores``, the state is stored on a tape before each flow.
     """
 
     dimension: int
@@ -101,7 +102,8 @@ class FlowFunctions:
         return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
-        """Return the function that computes the derivative of the increment of a flow, then applies this flow.
+        """Return the function that computes the derivative of the increment of a flow with respect to the state, and
+        then applies the flow.
 
         The argument ``part`` of the function selects one of ``count`` flows.
         """
@@ -130,9 +132,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` refers to the row of
-    the next flow. If ``size`` is None, the variable is the number of this row. Otherwise it is the address of this row,
-    and each row has ``size`` coefficients.
+    ``flow(part, row)`` yields the statements of one flow, where ``row`` is the row of its coefficients. ``rows`` is a
+    variable of the generated code, which refers to the row of the next flow. If ``size`` is None, ``rows`` is the
+    number of this row. Otherwise ``rows`` is the address of this row, and rows have ``size`` coefficients.
     """
 
     def further(count: int) -> ir.Value:
@@ -203,14 +205,13 @@ _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": 
 
 @dataclass(frozen=True)
 class Transposed:
-    """Description of the transposed kernel of one flow, by the indices of the values that the kernel computes and
-    reads.
+    """Description of the transposed kernel of one flow. All fields except the last two contain indices.
 
     The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; contributions to
-    other cotangents are always 0. The kernel also recomputes the values that the coordinates with the indices
-    ``before`` had before the flow. ``reads`` has the coordinates that the kernel reads, as ranges (first index,
-    length). ``full_range`` says whether the flow has a second version, in which elementary functions are correct for
-    all arguments; ``full_range_back`` says the same about the transpose.
+    other cotangents are always 0. The kernel also recomputes the values of the coordinates ``before`` at the start of
+    the flow. ``reads`` has the coordinates that the kernel reads, as ranges (first index, length). If ``full_range``,
+    the flow has a second version, in which elementary functions are correct for all arguments. If ``full_range_back``,
+    the transposed kernel has a second version of this kind.
     """
 
     state: Sequence[int]
@@ -223,11 +224,10 @@ class Transposed:
 
 @dataclass(frozen=True)
 class FlowTransposes:
-    """Builder of the functions that pull cotangents back through the flows of a splitting with ``dimension``
-    coordinates.
+    """Builder of the functions that pull cotangents back through the flows of a splitting.
 
-    ``row`` is the number of coefficients in a row. ``recomputes`` says whether the transposes also recompute the states
-    before the flows, so that no tape is needed.
+    The state has ``dimension`` coordinates, and each flow has a row of ``row`` coefficients. If ``recomputes``, the
+    transposes also recompute the states before the flows, so that no tape is needed.
     """
 
     flows: Sequence[Transposed]

@@ -93,16 +93,14 @@ class LatticeLoops:
         """Return the function of a transposed kernel. The original kernel belongs to a ``sweep`` or, without ``sweep``,
         to a stage.
 
-        ``gather`` has the sums that the kernel reads. The kernel recomputes, by the inverse flow, the values that
-        ``fields`` had before the sweep.
+        ``gather`` has the sums that the transposed kernel reads. By the inverse flow, the transposed kernel also
+        recomputes the values of ``fields`` before the sweep.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
-        """Return the transpose of the function that `sums` returns for ``ends``; ``kernel`` is the transposed
-        kernel.
-        """
+        """Return the transpose of the function `sums(ends)`; ``kernel`` is the transpose of the kernel of ``ends``."""
         source = "params" if "params" in kernel.inputs else "coef"
         return self._over_ends(ends, kernel, (source,), self._cotangents(kernel))
 
@@ -262,8 +260,8 @@ def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis. The offsets are stored in ``key``, the key of
-    the symbol for the weight of the term.
+    """Return, for each axis, the least and the largest offset at which a term of H reads values. ``key`` is the key of
+    the symbol for the weight of this term; it consists of these offsets.
     """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

@@ -79,7 +79,9 @@ def copies(
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
-    """Return the statement that sets pointers to arrays of the caller to null, after the arrays have been copied."""
+    """Return the statement that sets the pointers in ``params`` to null, after the arrays of the caller have been
+    copied.
+    """
     first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
     return ir.Assign(first, NULL, too=tuple(others))
 

@@ -70,7 +70,8 @@ class LatticeLaunches:
     others: Mapping[str, SiteLaunch] = field(default_factory=dict)
     arrays: tuple[str, ...] = ()
     neighbours: tuple[tuple[int, ...], ...] = ()  # offsets of the sites whose fields kernels read
-    # for each weight of a term at open ends: the least and the largest offset of the term along each axis
+    # for each weight of a term near open ends, and each axis: the least and the largest offset at which the term reads
+    # values
     bounds: tuple[tuple[tuple[int, int], ...], ...] = ()
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()

@@ -22,9 +22,9 @@ from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: Kinds of symbols for variables that are not in the spec. Variables of both kinds are printed with the names that the
-#: builder gives. If the spec uses such a name too, one of the two variables is renamed: for the kind FIXED the variable
-#: of the spec, for the kind LABEL the variable of the builder.
+#: Kinds of symbols for variables that are not in the spec. A variable of either kind is printed with the name that the
+#: builder of the code chose. If the spec has the same name, one of the two variables is renamed: the variable of the
+#: spec for the kind FIXED, the variable of the builder for the kind LABEL.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -171,8 +171,8 @@ class SystemParameter:
 
 @dataclass(frozen=True)
 class BondParameter:
-    """Parameter of the bond of the loop. If ``oriented``, it has the opposite sign for the site at the end b of the
-    bond.
+    """Parameter at the present bond of a loop over bonds. If ``oriented``, it has the opposite sign for the site at the
+    end b of the bond.
     """
 
     number: int
@@ -187,10 +187,10 @@ class Time:
 
 @dataclass(frozen=True)
 class Inside:
-    """Weight of a term near open ends: 0 at a site if the term there reads values beyond the ends of the lattice, else
+    """Weight of a term of H near open ends: 0 at sites where the term reads values beyond the ends of the lattice, else
     1.
 
-    ``bounds`` has the least and the largest offset of the term along each axis.
+    ``bounds`` has, for each axis, the least and the largest offset at which the term reads values.
     """
 
     number: int
@@ -204,10 +204,11 @@ class HasColour:
 
 @dataclass(frozen=True)
 class OnSeam:
-    """Weight of a term of H near boundary seams: 1 if the sweep of a part of H includes the term, else 0.
+    """Weight of a term of H near boundary seams: 1 if the present sweep includes the term, else 0.
 
-    The term begins at the site that is ``offset`` away from the site of the loop. It is included on two conditions: the
-    site where it begins has the colour ``colour``, and this site lies on exactly those seams that the sweep treats.
+    The term begins at the site that is ``offset`` away from the site of the loop. The sweep includes the term on two
+    conditions: the site where the term begins has the colour ``colour``, and this site lies on exactly those seams that
+    the sweep treats.
     """
 
     number: int
@@ -425,11 +426,11 @@ class Append:
 class Selection:
     """The sites over which a loop runs.
 
-    With a ``colour``, they are the sites of this colour. ``inside`` excludes the sites near boundary seams. With a
-    ``window``, the loop runs over sites near boundary seams, and evaluates the terms that begin on certain seams; the
-    bits of ``window`` are the axes of these seams. Sites with numbers below ``first`` are excluded. ``massive``
-    excludes the sites after the last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the
-    second site of a pair.
+    With a ``colour``, they are the sites of this colour. With ``inside``, sites near boundary seams are excluded. With
+    a ``window``, the loop runs only over sites near boundary seams, and evaluates the terms that begin on certain
+    seams: bit k of ``window`` is set for the seam of axis k. Sites with numbers below ``first`` are excluded. With
+    ``massive``, the sites after the last site that has a mass are excluded. In loops over pairs, ``first`` and
+    ``massive`` apply to the second site of a pair.
     """
 
     colour: int | None = None
@@ -449,8 +450,8 @@ class Loop:
 
     ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
     "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
-    ``threads`` sites. A loop of the kind "line" is printed on one line. A loop of the kind "search" may return from the
-    function. In both cases the body is a single statement.
+    ``threads`` sites. A loop of the kind "line" has a single statement in its body, and is printed on one line. A loop
+    of the kind "search" has a single statement too, which may return from the function.
     """
 
     kind: str
@@ -598,9 +599,9 @@ class ConstantTable:
 class Function:
     """Function of the generated code.
 
-    ``doc`` is printed as the comment of the function. ``role`` is the role of its kernel in a step, and ``returns`` is
-    the type of its result. On the level of sites, its parameters are some of `PARAMETERS`. On the level of memory, the
-    types of parameters are in ``types`` or else in `TYPES`.
+    ``doc`` is printed as the comment of the function. If the function evaluates a kernel, ``role`` is the role of this
+    kernel. ``returns`` is the type of the result. On the level of sites, the parameters are some of `PARAMETERS`. On
+    the level of memory, the types of parameters are in ``types`` or else in `TYPES`.
     """
 
     name: str

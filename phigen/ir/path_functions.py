@@ -41,7 +41,7 @@ class PathLayout:
     """
 
     def coefficient(self, i: int) -> ir.Value:
-        """Return coefficient i, a function of parameters and step."""
+        """Return coefficient i of the step; `phigen.scheme.staging` defines coefficients."""
         return ir.entry(COEF, i)
 
     def covector(self, i: int) -> ir.Value:
@@ -138,8 +138,8 @@ class PathFunctions:
         return [ir.in_place(s, place) for s, place in listed.items() if s in used]
 
     def linear(self, q: NodeSeries) -> ir.Value | None:
-        """Return the sum of those terms of a recurrence that are multiples of another series; None if there are
-        none.
+        """Return the sum of the terms ``q.linear`` of a recurrence, each of which is a multiple of a coefficient of
+        another series; None if there are none.
         """
         total: ir.Value | None = None
         for index, factor in q.linear:
@@ -309,8 +309,8 @@ class _LaneFunctions:
         return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
-        """Return the function that adds a product to derivatives of the path. The product is ∂(π p)/∂m at order j times
-        the derivatives of the path at order k − j.
+        """Return the function that adds a product to the derivatives of the path. One factor is ∂(π p)/∂m at order j;
+        the other factor is the derivatives of the path at order k − j.
 
         The derivatives are matrices with ``width`` columns in the member ``array`` of e; ``whose`` describes them in
         the comment.
@@ -389,11 +389,11 @@ def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
 
 
 def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.Value]]:
-    """Return a convolution of series a and b at order k (see `ConvolutionTerm`) as two parts: the summand of order j,
-    and the end terms.
+    """Return a convolution of two series at order k (see `ConvolutionTerm`) in two parts: a summand and a list of end
+    terms.
 
-    The summand contains a_j b_{k−j} for 0 < j < k; for some kinds of convolutions, the caller multiplies the sum by
-    1/k. The end terms contain coefficients of order 0 and k.
+    The summand contains a_j b_{k−j} and is to be summed over 0 < j < k; for some kinds of convolutions, the caller
+    multiplies the sum by 1/k. The end terms contain the coefficients of order 0 and k.
     """
     a, b, real = layout.order(t.a, J), layout.order(t.b, ir.Binary("-", K, J)), ir.Cast(J, "real")
     last = (layout.order(t.a, K), layout.order(t.b, ZERO))

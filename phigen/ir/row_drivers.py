@@ -24,8 +24,8 @@ LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
 
 #: Sites of a row segment: the first site, and the site after the last one. None stands for all sites of the segment.
 Sites = tuple[ir.Value, ir.Value] | None
-#: The sites of a row segment that are away from open ends and boundary seams; those near the first site of the segment;
-#: those near its last site.
+#: Three parts of a row segment: the sites away from open ends and boundary seams, the other sites near its first site,
+#: and the other sites near its last site.
 AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
 
 #: Number of sites in a SIMD vector. Loops that add whole vectors begin at multiples of this number, and rows are padded
@@ -43,9 +43,9 @@ class RowSegment:
     """Statements for one row segment: ``setup`` sets members of its record, and ``calls`` call the loops over its
     sites.
 
-    ``orders`` are declarations that all segments share. The calls change the fields with the numbers ``updated`` among
-    the ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo, the copies of sites
-    beyond both ends of a row.
+    ``orders`` are declarations that all segments share. The calls change the fields ``updated``, numbers of entries of
+    ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo. The halo has copies of
+    sites beyond both ends of a row.
     """
 
     calls: ir.Block
@@ -111,7 +111,7 @@ class RowDrivers:
         return discard_unread(function)
 
     def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
-        """Yield the statement that determines the part of H to which a flow of the schedule belongs.
+        """Yield the statement that finds the part of H for a flow of the schedule.
 
         The statement also assigns to the variable ``flow`` the colour that the flow updates.
         """
@@ -237,7 +237,9 @@ def member(name: str, value: ir.Value) -> ir.Assign:
 
 
 def _is_changed(body: ir.Block) -> bool:
-    """Whether statements change the record of a row segment. Calls for parts of the segment also change it."""
+    """Whether statements change the record of a row segment. A call for a part of the segment also changes the
+    record.
+    """
     assigned = (a.target for s in statements(body) for a in (s.assignments if isinstance(s, ir.Together) else [s])
                 if isinstance(a, ir.Assign))  # fmt: skip
     between = any(isinstance(v, ir.Called) and v.name == "between" for v in values(body))

@@ -36,7 +36,8 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: Names of arrays in JavaScript by kind of storage, and names of those parameters of functions that JavaScript renames.
+#: _ARRAYS has the names of arrays in JavaScript, by kind of storage. _PARAMETERS has the parameters of functions that
+#: have another name in JavaScript.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
@@ -53,8 +54,8 @@ def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 class _Tables:
     """The lowering of one function.
 
-    ``head`` has the declarations before the loops of the function, and ``hoisted`` the variables that are declared
-    already.
+    ``head`` has the declarations before the loops of the function. ``hoisted`` has the names of the variables declared
+    there.
     """
 
     function: ir.Function

@@ -1,7 +1,8 @@
-"""Forms of elementary functions: polynomials for small arguments, functions for all arguments, and versions for SIMD.
+"""Forms of elementary functions: polynomials for small arguments, functions for all arguments, and versions for
+SIMD.
 
-This pass follows `phigen.ir.passes.temporaries`. It replaces calls such as ``sin`` by ``sin_near`` or ``sin_lane``,
-functions which the runtime of a target defines. Functions that have no such version are called by their usual names.
+This pass follows `phigen.ir.passes.temporaries`. It replaces calls of functions that have several versions: for
+instance, it replaces ``sin`` by ``sin_near`` or ``sin_lane``. The runtime of a target defines these versions.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms in which functions are needed: a map from the suffix of a form to the versions that it
-    calls.
+    """Return the forms in which functions are needed: a map from the suffix of a form to the versions of elementary
+    functions that this form calls.
 
     The form "_near" is for small arguments, and "_full_range" for all arguments. ``small_argument`` are the elementary
     functions with a polynomial for small arguments. ``limited`` are the elementary functions whose fast versions fail

@@ -91,8 +91,8 @@ def of_colour(
     low: ir.Value = FROM,
     **more: Any,
 ) -> ir.Loop:
-    """Return the loop over the sites of colour ``swept`` from the site ``low`` on; over all sites if ``colour`` is
-    None.
+    """Return the loop over the sites from ``low`` on. If ``colour`` is not None, the loop runs only over the sites of
+    the colour ``swept``, a value in the generated code.
     """
     if colour is None:
         return over_sites(body, low=low, **more)
@@ -130,12 +130,12 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its row
-    function.
+    """A function that sums over the bonds or pairs of a site, and the ``arguments`` of its row function after ``coef``
+    and ``row``.
 
-    ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments follow ``coef``
-    and ``row``. They may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction in which
-    bonds are read) and ``across`` (a flag: the sites of the swept colour are at the opposite ends of the bonds).
+    ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments may be
+    ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction of a bond at the site where it
+    begins) and ``across`` (a flag: the sites of the swept colour are at the opposite ends of the bonds).
     """
 
     function: ir.Function
@@ -213,8 +213,8 @@ def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
 
 
 def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
-    """Yield the statements that store values in the arrays of callers. Some stores add: their values are added to each
-    value that is stored.
+    """Yield the statements that store the values of an observable in the array of the caller. A store with the flag
+    ``adds`` does not become a statement: its value is added to the value of each of the other stores.
     """
     shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:

@@ -62,12 +62,12 @@ class Handed:
 
 @dataclass(frozen=True)
 class Transpose:
-    """A transposed function on the level of sites, and the arrays in which its results are stored.
+    """A transposed function on the level of sites, and the arrays that it reads and writes.
 
-    The function reads cotangents of the kind ``seed``. They are stored in the arrays of cotangents of the fields with
-    the numbers ``fields``. If ``fields`` is empty, they are stored in the arrays ``varied`` of the row record. First
-    the function adds the contributions ``received``, which an earlier loop has stored. It stores its own contributions
-    to neighbours in the arrays of ``handed``. ``summed`` is the number of sums over bonds or pairs that the function
+    The function reads cotangents of the kind ``seed``. They are in the arrays of cotangents that belong to the fields
+    with the numbers ``fields``. If ``fields`` is empty, they are in the arrays ``varied`` of the row record. First the
+    function adds the contributions ``received``, which an earlier loop has stored. It stores its own contributions to
+    neighbours in the arrays of ``handed``. ``summed`` is the number of sums over bonds or pairs that the function
     reads; the cotangents of these sums are stored in the arrays from number ``sums_from`` on. The function also writes
     the fields ``recomputed``.
     """
@@ -83,8 +83,8 @@ class Transpose:
 
 
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
-    """Return the first of the two functions over a row segment that compute a transposed function; see
-    `handing`.
+    """Return the first of two row functions that replace a transposed function; `handing` returns the second
+    one.
 
     With ``vectors``, sums over sites are accumulated in SIMD registers.
     """
@@ -120,8 +120,8 @@ _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
 def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
-    """Return the contributions to other sites, by the number of their array, and the statements that store all results
-    of a site.
+    """Return two things: a map from the number of an array to the contribution to other sites that is stored in it, and
+    the statements that store all results of a site.
     """
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
@@ -144,8 +144,8 @@ def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.V
 
 
 def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
-    """Return the second of the two functions that compute a transposed function. In it, each site adds the
-    contributions that its neighbours have stored for it.
+    """Return the second of two row functions that replace a transposed function; `transposed` returns the first one. In
+    the second function, each site adds the contributions that its neighbours have stored for it.
     """
     pointers, added = _added_up("handed", handed, layout)
     head = [_pointer("bar", "bar", k, layout) for k in dict.fromkeys(h.base for h in handed)]
@@ -350,7 +350,9 @@ def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: i
 
 
 def _seeds(loop: ir.Loop) -> list[int]:
-    """Return the numbers of the cotangents of outputs that a loop reads at its own site, or at the ends of bonds."""
+    """Return the numbers of the outputs whose cotangents a loop reads at the site of the loop, or at the ends of a
+    bond.
+    """
     loads = (
         value for s in loop.body if isinstance(s, ir.Declare) for _, value in s.items if isinstance(value, ir.Load)
     )
