@@ -45,10 +45,11 @@ PACKS_PER_GROUP = 4
 #: of three steps.
 MEMBER_BATCHES = 4
 
-#: Members of an ensemble are integrated in batches up to this number of stages. The second number applies if kernels
-#: call functions and, in addition, the iteration for a single trajectory has only momenta as unknowns. In a batch, the
-#: iteration has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski
-#: top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
+#: Largest numbers of stages for which members of an ensemble are integrated in batches. The second number applies if
+#: kernels call functions and the iteration for a single trajectory has only a part of the unknowns
+#: (`phigen.scheme.steps.ReducedSweeps`). In a batch, the iteration has all unknowns, and takes longer. Measured time in
+#: batches, relative to members one by one: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15
+#: with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -101,8 +102,8 @@ class Packs:
 
     ``kernels`` are the kernels of a step, or of the flows of a splitting. ``small_argument`` are the functions that
     have a polynomial for small arguments. For larger arguments, a version for all arguments is called. ``transposes``
-    are the transposed kernels, if the reverse pass uses lanes too. It takes ``reverse_packs`` batches of members
-    together. If ``recomputed``, a transpose computes the state before a flow by the inverse flow.
+    are the transposed kernels, if the reverse pass uses lanes too. The reverse pass takes ``reverse_packs`` batches of
+    members together. If ``recomputed``, a transpose computes the state before a flow by the inverse flow.
     """
 
     kernels: tuple[Kernel, ...]
@@ -115,11 +116,12 @@ class Packs:
 
 @dataclass(frozen=True)
 class Rows:
-    """SIMD lanes of a lattice: neighbouring sites of a row. ``calls`` are the functions that loops over sites call.
+    """SIMD lanes of a lattice: neighbouring sites of a row. ``calls`` are the functions that loops over sites
+    call.
 
     ``small_argument`` are the functions that have a polynomial for small arguments. ``limited`` are the functions in
-    flows and stages whose fast versions fail at very large arguments: those with a polynomial, and those with a vector
-    version.
+    flows and stages whose fast versions may fail at very large arguments: all functions that have a polynomial for
+    small arguments, a vector version, or a formula of vector versions.
     """
 
     calls: frozenset[str]
@@ -253,7 +255,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        # Kernels of variations serve tangent maps and gradients. Other short code uses difference quotients of sweeps.
+        # Without tangent maps and gradients, short code has no kernels of variations: it uses difference quotients of
+        # sweeps.
         if not (program.extras.tangent or step.adjoint):
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]

@@ -12,8 +12,7 @@ from phigen.scheme.lowering import expand_powers
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.functions import FUNCTIONS
 
-#: LANE_FUNCTIONS have a vector version. LANE_FORMULAS maps a function without one to a formula in terms of functions
-#: that have one.
+#: LANE_FUNCTIONS have a vector version. LANE_FORMULAS maps other functions to formulas that call LANE_FUNCTIONS.
 LANE_FUNCTIONS = tuple(f.name for f in FUNCTIONS.values() if f.lanes == f.name)
 LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
@@ -23,11 +22,12 @@ SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions with a vector version for all arguments. There are three exceptions. The reduction of the arguments of sin
-#: and cos modulo π is exact only for |u| ≤ 10⁸. The vector version of exp fails beyond 700, and that of log at 0.
+#: Functions whose vector version, if there is one, is correct for all arguments. For sin and cos this holds for |u| ≤
+#: 10⁸, since the reduction of larger arguments modulo π is not exact. The vector version of exp fails beyond 700, and
+#: that of log at 0, so exp and log are missing here.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
-#: Exponents of powers that remain after lowering, and that need no library function.
+#: Exponents of the powers that need no library function: squares, reciprocals and square roots.
 _ARITHMETIC = (Fraction(2), Fraction(-1), Fraction(1, 2))
 
 

@@ -26,8 +26,8 @@ SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
     """Return how many additional values paths need on the stack in each lane, as two numbers.
 
-    The first number is multiplied by the number of stages. The second number is for one Taylor expansion, whose
-    derivatives have ``slope_terms`` terms.
+    The first number is for each stage. The second number is for one Taylor expansion, whose derivatives have
+    ``slope_terms`` terms.
     """
     n, path, used = (
         dimension,
