@@ -6,8 +6,8 @@ cotangents of the coefficients are summed over the steps of a run. At the end of
 which computes the coefficients from the parameters, is applied once.
 
 Each kind of step has its formulas. *newton*: the step solves y + a(y) = x for y, and x' = x + d(y). The kernel
-``linearise`` computes the matrices J = 1 + a' and M = d'. Let λ be the cotangent of x', and μ = J⁻ᵀ Mᵀ λ. The cotangent
-of x is λ + μ. The cotangent of a coefficient is the derivative of λ·d − μ·a with respect to this coefficient.
+``linearise`` computes the matrices J = 1 + ∂a/∂y and M = ∂d/∂y. Let λ be the cotangent of x', and μ = J⁻ᵀ Mᵀ λ. The
+cotangent of x is λ + μ. The cotangent of a coefficient is the derivative of λ·d − μ·a with respect to this coefficient.
 *explicit* steps and flows: one reverse sweep over their formulas. *path*: see `adjoint_path`. *gauss*: see
 `gauss_adjoint`.
 """
@@ -117,10 +117,10 @@ def gauss_adjoint(
 ) -> list[Kernel]:
     """Return three kernels that together transpose a Gauss step.
 
-    In a step with the weights w_j and the coefficients μ_ij, the stages Z_i solve Z_i = Σ_j μ_ij L_j with the
-    increments L_j = w_j f(x, Z_j). The new state is x' = x + D(x, Σ_j L_j). Let λ be the cotangent of x', and ε =
-    (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j.
-    Fixed-point sweeps solve these equations.
+    Let the method have the weights w_j, which contain the step size, and the coefficients μ_ij. The stages Z_i solve
+    Z_i = Σ_j μ_ij L_j with the increments L_j = w_j f(x, Z_j), where f is the vector field. The new state is x' = x +
+    D(x, Σ_j L_j). Let λ be the cotangent of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy
+    ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations.
 
     The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes the contribution of
     one stage to the cotangents of x and of the coefficients. The third kernel is the transpose of D.
@@ -174,8 +174,9 @@ def completed(
 def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
     """Return the transpose of ``prepare``, the kernel that computes the coefficients from the parameters.
 
-    If some coefficients are entries of matrix exponentials exp(tA), and the matrices tA depend on these parameters, the
-    transpose also reads the cotangents of the matrices tA.
+    ``differentiated`` are the symbols whose cotangents are computed, by input array: the parameters, and the energy
+    level if there is a monitor. Coefficients may be entries of matrix exponentials exp(tA). If the matrices tA depend
+    on ``differentiated`` symbols, the transpose also reads the cotangents of these matrices.
     """
     table_values = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]
@@ -231,12 +232,12 @@ def level_adjoint(system: System) -> Kernel:
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
     """Return the transpose of a step along a path ṁ = π(m)p.
 
-    The transpose consists of two things: recurrences that follow the path backwards, together with cotangents; and the
-    transpose of ∇S_h with respect to the coefficients. Let λ be the cotangent of the new state x' = m(1), and ν the
-    cotangent of the mean y = ∫ m dt. The cotangent a of m starts at a = λ. It satisfies ȧ = ∂(π(m)p)/∂mᵀ a + ν, if time
-    runs backwards along the path. The cotangent of x is the final value of a, and the cotangent of p is ω = ∫ π(m)ᵀ a
-    dt. The cotangent of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt. Since p = ∇S_h(y), ν = Hess S_hᵀ ω. This results in a
-    linear equation for ω.
+    The transpose has two parts: recurrences that follow the path backwards, together with cotangents, and the transpose
+    of ∇S_h with respect to the coefficients. Let λ be the cotangent of the new state x' = m(1), and ν the cotangent of
+    the mean y = ∫ m dt. The cotangent a of m starts at a = λ, and satisfies ȧ = ∂(π(m)p)/∂mᵀ a + ν if time runs
+    backwards along the path. The cotangent of x is the final value of a. The cotangent of p is ω = ∫ π(m)ᵀ a dt. The
+    cotangent of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt. Since p = ∇S_h(y), ν = Hess S_hᵀ ω. Together these equations are
+    a linear equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

@@ -40,7 +40,7 @@ class Alternation:
 
     @property
     def stages(self) -> int:
-        """The number of stages of a step. Each stage applies the flows of all parts twice, in opposite orders."""
+        """The number of stages of a step. A stage applies χ* and then χ, as defined in this module."""
         return len(self.fractions) // 2
 
 
@@ -98,9 +98,9 @@ class Schedule:
     pattern lists pairs of a part and a row: the flow of this part runs for the time in this row of ``times``. In the
     pattern, rows are counted from the first row of the stage.
 
-    Some methods replace V, one of two parts, by a modified potential V + κ{V, {V, T}} with κ = m h². Then ``multiples``
-    has the number m for each row; m is 0 for flows without a modified potential. If H depends on the time, ``moments``
-    has for each row the fraction of the step at which H is evaluated.
+    If H = T + V, a method may replace V by a modified potential V + κ{V, {V, T}} with κ = m h². Then ``multiples`` has
+    the number m for each row; m is 0 for flows without a modified potential. If H depends on the time, ``moments`` has
+    for each row the fraction of the step at which H is evaluated.
 
     If the method has a corrector, a run starts with the flows ``begin`` and ends with the flows ``end``. Their rows
     follow the rows of the step.
@@ -135,10 +135,10 @@ class Schedule:
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
     """Return the schedule for an H that depends on the time, with the time at which each flow evaluates H.
 
-    The times are fractions of the step. The time advances during the flows of one part, and is fixed during all other
-    flows. This part has the number ``carrier``; it is the first or the last part. The Hamiltonian is H + e, where e is
-    the conjugate of the time, and e belongs to this part. If ``carrier`` equals ``parts``, the number of parts of H,
-    then e is a part by itself. The result omits the flows of this part, since they only advance the time.
+    The times are fractions of the step. The Hamiltonian is H + e, where e is the conjugate of the time. e belongs to
+    the part with the number ``carrier``, which is the first or the last part. The time advances during the flows of
+    this part, and is fixed during all other flows. If ``carrier`` equals ``parts``, the number of parts of H, then e is
+    a part by itself. The flows of e alone only advance the time, and the result omits them.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:

@@ -30,8 +30,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Some outputs have the components p_i of a matrix P = Σ p_i E_i with basis matrices E_i, then a bound for the square
-#: of the norm of P. This is the comment on the bound in generated code.
+#: Comment in generated code on the last entry of some outputs. The other entries are the components p_i of a matrix P =
+#: Σ p_i E_i with basis matrices E_i. The last entry is a bound for the square of the norm of P.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
@@ -187,10 +187,10 @@ def _element_after_flow(system: System, group: Group, turning: Turning, time: Ex
 
 
 def uniform(system: System) -> bool:
-    """Whether Casimirs in H rotate the body at a constant angular velocity.
+    """Whether Casimirs in H rotate the body at a constant angular velocity, as seen in the frame in which the momentum
+    is constant.
 
-    The velocity is that in the frame in which the momentum is constant. Forces, a monitor, or an H that depends on the
-    time make the velocity vary.
+    Forces, a monitor, or an H that depends on the time make the velocity vary.
     """
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)
@@ -199,11 +199,12 @@ def uniform(system: System) -> bool:
 def rate_kernel(
     system: System, group: Group, gauge: Gauge, further_gradients: Sequence[Expression] = ()
 ) -> Kernel | None:
-    """Return the kernel of the gradient of all functions that are subtracted from H, or None if there are none.
+    """Return the kernel of the gradient of the function that is subtracted from H; None if nothing is
+    subtracted.
 
-    These functions are the Casimirs of the gauge, multiplied by their λ, and the functions in ``further_gradients``.
-    Raises `SpecError` if there are such functions together with a monitor or forces, since the rotation by the Casimirs
-    is then not uniform.
+    This function is the sum of the Casimirs of the gauge, multiplied by their λ, and of the functions with the
+    gradients ``further_gradients``. Raises `SpecError` if there is such a function together with a monitor or forces,
+    since the rotation by the Casimirs is then not uniform.
     """
     subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]

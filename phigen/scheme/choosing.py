@@ -41,9 +41,9 @@ FLOW_LATENCY = 12
 class ScheduledMethod:
     """A splitting method, and the parts of H in the order in which a step applies their flows.
 
-    If the method has modified kicks, their flow takes the place of the flow of V. ``why`` is the reason of the choice,
-    as text for the user. If H depends on the time, ``carrier`` is the number of the part during whose flow the time
-    advances. If no part has this number, the time advances separately, after all flows.
+    If the method has modified kicks, their Hamiltonian V + κ{V, {V, T}} is the part in place of V. ``why`` is the
+    reason of the choice, as text for the user. If H depends on the time, ``carrier`` is the number of the part during
+    whose flow the time advances. If no part has this number, the time advances separately, after all flows.
     """
 
     order: Order
@@ -229,10 +229,11 @@ def orders(composition: str) -> list[int]:
 
 
 def arranged(splitting: SplitHamiltonian) -> SplitHamiltonian:
-    """Return the parts in the order in which a step of an alternation is cheapest, with the most expensive part last.
+    """Return the parts in the order in which a step of an alternation is cheapest, with the most expensive part
+    last.
 
-    The flow of the last part occurs once in each stage. The flow of the first part occurs once in each stage and once
-    more in the step. The flows of all other parts occur twice in each stage.
+    In a step of s stages, the flow of the last part occurs s times, and the flow of the first part s + 1 times. The
+    flow of every other part occurs 2s times.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
     return SplitHamiltonian((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))

@@ -2,17 +2,17 @@
 simple steps φ, is more accurate than φⁿ.
 
 A step is φ = e^{hA/2} e^{hεB} e^{hA/2}. To first order in ε, φ is the flow of A + ε f(z) B, where z = h ad_A and f(z) =
-(z/2)/sinh(z/2). Let C = e^{εhG}, with an odd series G = g(z) B. Then C φ C⁻¹ is the flow of A + ε(f(z) − z g(z)) B to
-this order. If z g(z) = f(z) − 1 up to z^{2k}, the error of first order in ε begins at εh^{2k+2}; the error ε²h²
+(z/2)/sinh(z/2). Let C = e^{εhG}, with an odd series G = g(z) B. Then, to first order in ε, C φ C⁻¹ is the flow of A +
+ε(f(z) − z g(z)) B. If z g(z) = f(z) − 1 up to z^{2k}, the error of first order in ε begins at εh^{2k+2}; the error ε²h²
 remains.
 
-C is a product of flows of A, B, A, B, A over the times c_i, −b_i, −2c_i, b_i, c_i, one such product for each i = 1, …,
-k. Then g(z) = Σ 2 b_i sinh(c_i z). For chosen c_i, the b_1, …, b_k solve a linear system. C is a Poisson map, as a
-product of exact flows.
+C is a product of k factors. Factor i is the product of five flows: of A, B, A, B, A over the times c_i, −b_i, −2c_i,
+b_i, c_i. Then g(z) = Σ 2 b_i sinh(c_i z). For chosen c_i, the b_1, …, b_k solve a linear system. C is a Poisson map, as
+a product of exact flows.
 
-The order of the flows of B in this C causes an error ε²h³. A *balanced* C avoids this error. It is the product for the
-pairs (c_i, b_i/2), followed by the product for the pairs (−c_i, −b_i/2) in reverse order. Its logarithm is odd in ε.
-The balanced C is used with steps that have B − h²{B, {B, A}}/24 in place of B, and hence no error ε²h².
+The sequence of the flows of B in this C causes an error ε²h³. A *balanced* C avoids this error. It has first the
+factors for the pairs (c_i, b_i/2), then the factors for the pairs (−c_i, −b_i/2) in reverse order. Its logarithm is odd
+in ε. The balanced C is used with steps that have B − h²{B, {B, A}}/24 in place of B, and hence no error ε²h².
 
 J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute Communications 10 (1996); J. Wisdom, Symplectic
 correctors for canonical heliocentric n-body maps, Astronomical Journal 131 (2006).
@@ -37,10 +37,10 @@ SPACING = Fraction("0.418330013267037773994000")
 def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
     """Return the durations of the flows at the end of a run for H = A + εB, in units of a step.
 
-    These are flows of A and B by turns, beginning with A: a flow of A over minus half a step, then the flows of the
-    corrector C. Since C begins with a flow of A too, the first two flows are merged into one. A run starts with the
-    inverses of these flows, in reverse order. At order 1 there is no C. A ``balanced`` C has twice as many flows, and
-    causes no error ε²h³.
+    The flows of A and of B alternate. The first one is a flow of A over minus half a step, merged with the first flow
+    of the corrector C, which is a flow of A too. The other flows of C follow. A run starts with the inverses of these
+    flows, in reverse order. At order 1 there is no C. A ``balanced`` C has twice as many flows, and causes no error
+    ε²h³.
     """
     times, pairs = [-Fraction(1, 2)], _pairs((order - 1) // 2)
     if balanced:
@@ -51,9 +51,10 @@ def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
 
 
 def schedule(end: Sequence[Fraction]) -> Schedule:
-    """Return the schedule of a method with a corrector for H = A + εB: a step is one flow of B and one flow of A.
+    """Return the schedule of a method with a corrector for H = A + εB: a step is one flow of B and one flow of
+    A.
 
-    ``end`` has the durations of the flows of the corrector after a run of steps; the inverse flows come before the run.
+    ``end`` has the durations of the corrector's flows at the end of a run. The inverses of these flows start the run.
     """
     times = (Fraction(1), Fraction(1), *(-t for t in reversed(end)), *end)
     parts = [B if k % 2 else A for k in range(len(end))]

@@ -203,10 +203,10 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """Return the discretisation with forces, p = h(∇H + ζ), where ζ is the covector force.
+    """Return the discretisation with forces: p = h(∇H + ζ), where ζ is the covector force.
 
-    With a symmetric bi-realisation, this step has order 2, and compositions of such steps have higher orders. With any
-    other bi-realisation the order is 1.
+    If the bi-realisation is symmetric, one stage with this p has order 2, and compositions of several stages have
+    higher orders. With any other bi-realisation the order is 1.
     """
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector force needs a bi-realisation in closed form, but {realisation.kind} follows paths"

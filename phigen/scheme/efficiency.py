@@ -52,11 +52,11 @@ NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.6, 10: 1.3}
 
 
 def cost(program: Program, grown: float = 1.0) -> float:
-    """Return the estimated computing time of a trajectory of fixed length, at equal accuracy.
+    """Return the estimated computing time of a trajectory of fixed length, at the accuracy that this module assumes for
+    the order.
 
-    The accuracy is that which this module assumes for the order. The unit of the result is arbitrary, but equal for all
-    schemes. A program of higher order has more operations. A lower bound for its time follows from a program of lower
-    order, with the number of operations multiplied by ``grown``.
+    The unit of the result is arbitrary, but equal for all schemes. The number of operations in the program is
+    multiplied by ``grown``; `series_bound` uses this factor to estimate programs of higher order.
     """
     step, even_order = program.step, program.order + program.order % 2
     return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even_order]

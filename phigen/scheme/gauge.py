@@ -29,13 +29,13 @@ from phigen.symbolic.tower import Tower
 #: the additional terms cost more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
-#: The gauge makes the error h^i π∇S_i of one term S_i of the generating function small. This is its index i.
+#: The gauge makes the error h^i π∇S_i small, where S_i is a term of the generating function. This is the index i.
 GUIDE = 3
 
 #: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches for a gauge.
-#: The search evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ. At this limit it takes some
-#: ten million operations, a hundredth of a second, at the start of each trajectory. The example systems in ``specs``
-#: need at most 2,600 operations.
+#: The search has up to four rounds. In each round it evaluates π∇S_3 at 32 states for 7 values of the multiple λ of a
+#: Casimir. At this limit it takes some ten million operations, a hundredth of a second, at the start of each
+#: trajectory. The example systems in ``specs`` need at most 2,600 operations.
 MOST_GUIDE_OPERATIONS = 10_000
 
 

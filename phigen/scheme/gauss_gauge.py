@@ -22,7 +22,7 @@ LARGEST_DENOMINATOR = 1000
 
 
 def slowest(system: System, realisation: Realisation) -> Gauge:
-    """Return the gauge of quadratic Casimirs for which the group elements of a step are slowest.
+    """Return the multiples of quadratic Casimirs for which the group elements of a step move most slowly.
 
     The gauge is empty if the second derivatives of H are not constant.
     """

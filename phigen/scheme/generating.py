@@ -26,12 +26,14 @@ from phigen.symbolic.symbols import LEVEL, STEP
 
 @dataclass(frozen=True)
 class GeneratingFunction:
-    """The generating function of a step as expressions: ``slope`` is ∇S_h and ``hessian`` the full n×n matrix Hess S_h.
+    """The generating function of a step as expressions: ``slope`` is ∇S_h and ``hessian`` the full n×n matrix
+    Hess S_h.
 
-    ``form`` says in words how the expressions are written, for instance as polynomials, with ``terms`` terms.
-    ``coefficients`` is the table of the symbols ``c:k`` in the expressions. It includes coefficients that every step
-    computes anew. For a monitored system, ``elapsed`` is the duration of a step, ∂S_h/∂e with the energy level e. If
-    the spec has a force field ζ, which is added to ∇H, then ``slope`` is ∇S_h + hζ, and ``free`` is ∇S_h.
+    ``form`` says in words how the expressions are written, for instance as polynomials. ``terms`` is the number of
+    terms of a polynomial. ``coefficients`` is the table of the symbols ``c:k`` in the expressions. It includes
+    coefficients that every step computes anew. For a monitored system, ``elapsed`` is the duration of a step, ∂S_h/∂e
+    with the energy level e. If the spec has a force field ζ, which is added to ∇H, then ``slope`` is ∇S_h + hζ, and
+    ``free`` is ∇S_h.
     """
 
     slope: tuple[Expression, ...]
@@ -80,9 +82,10 @@ def collected_form(
     """Return S_h as a collected polynomial, in up to two forms.
 
     In the first form each entry of the Hessian is a polynomial. In the second form the Hessian is the derivative of the
-    Horner form of the gradient. ``increments`` are the symbols of noise increments, on which coefficients may depend.
-    The list is empty if the polynomial has too many monomials, compared with ``worth`` or with `limits.CELLS`. Raises
-    `OverflowError` if the polynomial is too large to be counted.
+    Horner form of the gradient. ``worth`` is the cost of another form of S_h, in units of an addition. ``increments``
+    are the symbols of noise increments, on which coefficients may depend. The list is empty if the polynomial has far
+    more monomials than ``worth``, or more exponents than `limits.CELLS`. Raises `OverflowError` if the polynomial is
+    too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)

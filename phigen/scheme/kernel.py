@@ -106,9 +106,9 @@ class Kernel:
 
     The first output may contain matrices A; the generated function then returns exp(A) − 1 in place of A.
     ``exponentials`` has two numbers for each A: the index of its first entry in the output, and its number of rows. The
-    transpose of such a kernel reads the cotangents of the A as its input `EXPONENTS`. The generated code computes them
-    from the cotangents of exp(A) − 1, which the input ``coef_bar`` holds; to this end ``exponents`` is a kernel that
-    computes all A.
+    transpose of such a kernel has two inputs for cotangents. ``coef_bar`` has the cotangents of exp(A) − 1, and
+    `EXPONENTS` the cotangents of the matrices A. The generated code computes `EXPONENTS` from ``coef_bar`` and from the
+    matrices A, which the kernel ``exponents`` computes.
     """
 
     name: str

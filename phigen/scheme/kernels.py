@@ -28,7 +28,7 @@ from phigen.spec import limits
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP, Symbol, momentum
 
-#: Largest dimension in which elimination is written as straight-line code for every matrix, even without zeros.
+#: Largest dimension in which elimination is always written as straight-line code, even for matrices without zeros.
 UNROLLED_DIMENSION = 4
 #: Limit for higher dimensions n: elimination is written as straight-line code if it takes at most this number times n³
 #: operations. A full matrix takes 0.7 n³; matrices with many zeros stay below the limit.

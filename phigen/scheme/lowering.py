@@ -25,7 +25,9 @@ MAX_STATEMENT_OPERATIONS = 14
 
 @dataclass(frozen=True)
 class Assignment:
-    """The assignment of ``value``, an expression tree over symbols and earlier temporaries, to the name ``target``."""
+    """The assignment of ``value`` to the name ``target``; ``value`` is an expression tree over symbols and earlier
+    temporaries.
+    """
 
     target: str
     value: Expression
@@ -112,8 +114,8 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
     """Return the roots with products such as ½(ab), a number times a product, rewritten as (½a)b.
 
-    The number is multiplied with the factor that occurs in the most products with the same number. A product remains
-    unchanged if its factors occur in no other such product.
+    The number is multiplied with the factor that occurs in the most products with the same number. A product ½(ab)
+    remains unchanged if neither a nor b occurs in another product with the number ½.
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)

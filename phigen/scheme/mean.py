@@ -18,11 +18,12 @@ from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
-    """Return the kernel of the derivatives of α and of β − α with respect to the mean y of a path with n coordinates.
+    """Return the kernel of the derivatives of α and of β − α with respect to the mean y of a path with n
+    coordinates.
 
-    Its inputs are the derivatives with respect to the middle m and to p, and the Hessian H of S_h. Let M and N be the
-    derivatives of the mean with respect to m and p. For fixed p, the derivative of m with respect to y is M⁻¹. If p =
-    ∇S_h(y) varies with y, it is M⁻¹ (1 − N H).
+    Its inputs are the derivatives with respect to the middle m and to p, and Hess S_h. Let M and N be the derivatives
+    of the mean with respect to m and p. For fixed p, the derivative of m with respect to y is M⁻¹. If p = ∇S_h(y)
+    varies with y, the derivative of m is M⁻¹ (1 − N Hess S_h).
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))

@@ -64,12 +64,17 @@ def _flow(system: System, source: Source) -> Flow:
 
 
 def driving_times(system: System) -> list[Expression]:
-    """Return for each source of noise the duration σ ΔW of its flow in half a step; all share one symbol ΔW."""
+    """Return for each source of noise the duration σ ΔW of its flow, where ΔW is the increment of the source in half a
+    step.
+
+    All sources share one symbol ΔW.
+    """
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 
 def driven(system: System) -> list[Flow]:
-    """Return for each source of noise the flow of its Hamiltonian over the duration σ ΔW of half a step.
+    """Return for each source of noise the flow of its Hamiltonian over the duration σ ΔW, where ΔW is the increment of
+    the source in half a step.
 
     Raises `SpecError` if such a flow is not elementary.
     """

@@ -70,8 +70,8 @@ def paired(
     """Return the transpose of a kernel of bonds or pairs, with all contributions of a bond added to its site a.
 
     ``ends`` maps each symbol to a pair: a field or parameter, and an end. The parameters of bonds in ``opposite`` have
-    the opposite sign as seen from b. Some outputs contribute to sums over the whole lattice, or to parameters of bonds.
-    A loop over all sites and their bonds or pairs must add them up.
+    the opposite sign for the site at the end b. Some outputs contribute to sums over the whole lattice, or to
+    parameters of bonds. A loop over all sites and their bonds or pairs must add these outputs up.
     """
     names = {place: s for s, place in ends.items()}
     exchanged = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}

@@ -42,7 +42,9 @@ def count(value: int, description: str) -> int:
 
 @dataclass(frozen=True)
 class StartPolicy(Policy):
-    """The first evaluation of the coefficients, which checks the values of parameters before a step size is known."""
+    """The step size for a first evaluation of the coefficients. This evaluation checks the values of parameters before
+    a run has a step size.
+    """
 
     probe_step: float = number(1e-100, "parameters are checked by the coefficients of this step size")
 

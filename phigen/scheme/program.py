@@ -177,8 +177,8 @@ class Attitude:
 class StackBound:
     """Bytes of stack that a generated C solver needs, measured with a ``compiler`` and its flags.
 
-    The stack is that of the longest chain of calls. ``init`` and ``step`` are the values for calls of these two
-    functions; ``longest`` is the largest value over all functions.
+    Each number is for the longest chain of calls that begins in a function of the solver: in `NAME_init` (``init``), in
+    `NAME_step` (``step``), or in any function (``longest``).
     """
 
     compiler: str

@@ -14,7 +14,7 @@ from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Largest number of fields of a site for which permutations of the fields are tried: 3 fields have 6 orders.
+#: Largest number of fields of a site, or of parameters of a bond, whose permutations are tried: 3 fields have 6 orders.
 MOST_FIELDS = 3
 
 
@@ -45,8 +45,8 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
     """Yield equivalent forms of the sums over bonds.
 
     In some forms, parameters of bonds are permuted; in others, all bonds are reversed. Each item consists of the sums,
-    the order of the parameters (() if it is unchanged), and a sign. Bonds are reversed, with the sign −1, only if it is
-    proved that every contribution changes its sign with the direction of the bond.
+    the order of the parameters, and a sign. The order is () if it is unchanged. The sign is −1 if bonds are reversed.
+    Bonds are reversed only if every contribution provably changes its sign with the direction of the bond.
     """
     loops = over_ends(gather)
     if len(loops) != 1 or not loops[0][1]:

@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. On lattices an input has the same name. This input
-#: has fields after the flow, namely those that the kernel needs for this output and for no other.
+#: Name of an output of a transposed flow: the state before the flow. On lattices, an input has the same name. It has
+#: the fields after the flow that the flow updates and that no other input has.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1

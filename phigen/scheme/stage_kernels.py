@@ -1,5 +1,5 @@
-"""Kernels for a stage of a lattice. Some transpose its equation. Another one computes derivatives for the diagonal
-blocks of the Newton matrix, one block for each site.
+"""Kernels for the implicit equation of a stage of a lattice: the transpose of the equation in three kernels, and the
+diagonal blocks of the Newton matrix, one block for each site.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from phigen.symbolic.expression import ZERO, gradient
 #: respect to y at the same site.
 _BLOCK = "own_slope"
 
-#: Selections of the cotangents that a transposed kernel computes. The first entry of a pair says whether it computes
-#: those of fields, the second whether it computes all others.
+#: Selections of the cotangents that a transposed kernel computes, as pairs of flags. The first flag is for the
+#: cotangents of fields, the second for all other cotangents.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
 #: Transposed kernels of a stage in the order of the reverse pass, with the kernels that they transpose. The first one

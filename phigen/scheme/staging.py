@@ -31,10 +31,10 @@ TABLE, NOW = "coef", "now"
 class Coefficients:
     """The table of the coefficients ``c:k`` of a program: expressions that do not depend on the state.
 
-    No expression occurs twice. ``values`` are the expressions that ``prepare`` computes. Then come the entries of the
-    matrices exp(tA) − 1 in ``exponentials``, and last the ``renewed`` expressions, which depend on the inputs of a
-    step. The places of the last two groups are unknown until the table is complete. Until then they have provisional
-    symbols, which `settled` replaces.
+    No expression occurs twice. The table has three groups of entries, in this order: the expressions ``values``, which
+    ``prepare`` computes; the entries of the matrices exp(tA) − 1 in ``exponentials``; and the ``renewed`` expressions,
+    which depend on the inputs of a step. The places of the second and the third group are unknown until the table is
+    complete. Until then their entries have provisional symbols, which `settled` replaces.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:

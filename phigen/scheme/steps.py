@@ -28,10 +28,10 @@ class PathAdjoint:
     """The kernels and recurrences that transpose a step along a path; the formulas are in
     `phigen.scheme.adjoint`.
 
-    ``recurrences`` follow the path backwards, together with cotangents. The last of these are the cotangents of the
-    coefficients; ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and its Hessian at the
-    mean of the path. ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the
-    recurrences for the derivatives of a path, by which many paths are transposed at once.
+    ``recurrences`` follow the path backwards, together with cotangents; the cotangents of coefficients come last.
+    ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and its Hessian at the mean of the path.
+    ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the
+    derivatives of a path, by which many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -161,7 +161,9 @@ class _Staged:
 
     @property
     def multiples(self) -> tuple[float, ...]:
-        """The numbers m of the modified potentials V + m h² {V, {V, T}}, one for each row of the schedule, or ()."""
+        """The numbers m of the modified potentials V + m h² {V, {V, T}} for H = T + V, one for each row of the
+        schedule; () if the method has no modified potentials.
+        """
         return self.flow_schedule.multiples if self.flow_schedule else ()
 
     @property
@@ -528,7 +530,9 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The size from which on every size of the axis is allowed: that of the longest seam, plus ``wide`` sites."""
+        """The smallest size of the axis from which on all sizes are allowed: the size of the longest seam, plus
+        ``wide`` sites.
+        """
         return 2 * self.wide + self.period - 1
 
 
@@ -730,9 +734,9 @@ class Sweeps(_Scheduled):
     parts, and the schedule lists the stages.
 
     On a graph a part may belong to one colour (``by_colour``); the flows of all parts are then repeated for each
-    colour. In this case the numbers in the ``schedule`` are not parts: 0 is the first flow, 1 are the flows in the
-    middle in order, 2 is the last flow, and 3 are the flows in the middle in reverse order. If H depends on the time,
-    the advance of the time counts as the last flow, and the flow of the last part as one in the middle.
+    colour. In this case each number in the ``schedule`` stands for a sequence of flows: 0 for the first flow, 1 for the
+    flows in the middle, 2 for the last flow, and 3 for the flows in the middle in reverse order. If H depends on the
+    time, the advance of the time is the last flow, and the flow of the last part is one in the middle.
 
     If bodies have ``relative`` coordinates, the fields are transformed to these coordinates before the flows, and back
     after them.
@@ -772,11 +776,11 @@ class Sweeps(_Scheduled):
         )
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Return which values the sweeps of a part of H access: (distance behind, distance ahead, read,
-        updated).
+        """Return four numbers that say which values the sweeps of a part of H access.
 
-        The distances count along the first axis of a grid. ``read`` is the bit mask of the fields that are read at
-        other positions along this axis. ``updated`` is the bit mask of the fields that are updated.
+        The first two are the distances, along the first axis of a grid, of the farthest neighbours that are read:
+        behind a site, and ahead of it. The third is the bit mask of the fields that are read at other positions along
+        this axis. The fourth is the bit mask of the fields that are updated.
         """
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
         distant = [(f, offset[0]) for f, offset in places if offset[0]]

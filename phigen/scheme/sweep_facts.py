@@ -29,8 +29,6 @@ def reach(step: Sweeps) -> int:
 def band(step: Sweeps) -> int:
     """Return the number of off-diagonals on each side of the Newton matrix of a stage; 0 if band elimination does not
     apply.
-
-    A distance of one site counts as many off-diagonals as there are fields.
     """
     if not step.equation or step.partners or len(step.sites.axes) > 1:
         return 0
@@ -105,10 +103,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether the loop of the next flow adds the cotangents that a flow passes to other sites of a grid.
+    """Whether cotangents that a flow passes to other sites of a grid are added by the loop of the next flow in the
+    reverse pass, instead of by separate loops.
 
-    Otherwise separate loops add them. Loops that add cotangents have long code, and are used only in the profile
-    ``fast``.
+    Loops that add cotangents have long code, and are used only in the profile ``fast``.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False

@@ -77,8 +77,8 @@ def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
     """Return a transposed kernel in which some factors for open ends are omitted.
 
     A factor is 0 if a term of H extends beyond an open end, else 1. Factors are omitted in values that a site stores
-    for a neighbour; the values for many neighbours are then often the same. A factor can be omitted if it is 1 at every
-    site that has this neighbour. It cannot be omitted if the term extends beyond the neighbour.
+    for a neighbour: without factors, the values for several neighbours are often equal. A factor can be omitted if it
+    is 1 at every site that has this neighbour. It cannot be omitted if the term extends beyond the neighbour.
     """
 
     def without_weights(name: str, value: Expression) -> Expression:
