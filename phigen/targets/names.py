@@ -38,7 +38,8 @@ class Scope:
     """Identifiers of the symbols in one function, all distinct."""
 
     def __init__(self, reserved: Reserved) -> None:
-        # Generated code has temporaries such as t12, so a coordinate with this name gets another identifier.
+        # Temporaries in generated code are called t1, t2, …, so coordinates with names of this form get other
+        # identifiers.
         self._reserved = Reserved(reserved.words, re.compile(rf"t\d+|{reserved.pattern.pattern}"))
         self._identifiers: set[str] = set()
         self._codes: dict[str, str] = {}

@@ -1,8 +1,8 @@
 """Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
-A name in a spec must not equal a macro of a standard header: generated C would not compile, or a program would not
-compile that includes the standard header before the header of a solver. Tests compare the lists with the compilers of
-the machine that runs the tests.
+A name in a spec must not equal a macro of a standard header. Otherwise generated C would not compile, or users could
+not include the standard header before the header of a solver. Tests compare the lists with the compilers of the machine
+that runs the tests.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ sigev_notify_function signgam sparc stderr stdin stdout sun unix vax"""
 _WINDOWS = (
     """CONST ERROR FALSE FAR IN NEAR OPTIONAL OUT PURE THIS TRUE VOID cdecl far hyper interface near pascal small"""
 )
-#: Macros of windows.h and rpcndr.h that are common words. A program may include these headers before that of a solver.
-#: A member ``far`` of a struct would then vanish, since this macro is empty.
+#: Macros of windows.h and rpcndr.h that are common words. A program may include windows.h before the header of a
+#: solver. For instance, the macro ``far`` is empty, so a member ``far`` of a struct would vanish.
 WINDOWS_MACROS = frozenset(_WINDOWS.split())
 _ERRNO = """2BIG ACCES ADDRINUSE ADDRNOTAVAIL ADV AFNOSUPPORT AGAIN ALREADY BADE BADF BADFD BADMSG BADR BADRQC BADSLT
 BFONT BUSY CANCELED CHILD CHRNG COMM CONNABORTED CONNREFUSED CONNRESET DEADLK DEADLOCK DESTADDRREQ DOM DOTDOT DQUOT

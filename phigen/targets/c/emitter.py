@@ -35,10 +35,10 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Cost model of blocks, in which several steps are solved together. One iteration of a block evaluates each of its
-#: steps once. The constants say how many iterations of a block cost as much, per step, as one evaluation of a step
-#: alone. PASSES is for vectorised blocks. PASSES_OF_CALLS is for two cases: blocks that call library functions are not
-#: vectorised, and blocks of steps along paths also compute derivatives, which a step alone does not need.
+#: Cost model of blocks, in which several steps are solved together. An iteration of a block evaluates each of its steps
+#: once. For each step, it costs 1/PASSES of the evaluation of a single step if the block is vectorised. The cost is
+#: 1/PASSES_OF_CALLS for blocks that call library functions, since these blocks are not vectorised, and for blocks of
+#: steps along paths, since these blocks also compute derivatives.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
@@ -69,10 +69,11 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 
 
 def unrestricted(program: Program, code: str) -> str:
-    """Return code that compilers accept which refuse ``restrict``: those of C++, and Microsoft's.
+    """Return code that all compilers accept, including those that refuse ``restrict``: those of C++, and Microsoft's C
+    compiler.
 
-    The word is removed from code that it does not make faster. It remains in the profile ``fast``, and in loops over
-    lanes or sites. There, a macro removes the word for these compilers.
+    The profile ``fast`` and code with loops over lanes or sites keep the keyword, since it makes loops faster. There, a
+    macro removes the keyword for the compilers that refuse it. In all other code the keyword is left out.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")
@@ -423,7 +424,7 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
 
 
 def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:
-    """Return the kernels that the reverse pass of each kind of step calls."""
+    """Return the kernels of the reverse pass that do not depend on the kind of step, and those for paths."""
     path = [adjoint.path.curvature, adjoint.path.slope] if adjoint.path else []
     kernels = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
     return [*kernels, program.monitor.level] if program.monitor and program.monitor.level else kernels

@@ -163,7 +163,8 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
-    """Return the definitions of functions of small arguments for loops over sites.
+    """Return the definitions of functions for loops over sites. The functions are correct only for small
+    arguments.
 
     Their polynomials have the fewest terms that give full precision.
     """

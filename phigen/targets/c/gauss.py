@@ -14,10 +14,10 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: Threshold for the end of sweeps in single precision. The number is written as for double precision, and
-#: `phigen.targets.c.real.threshold` converts it to 1e-9. In multiples of a rounding error, 1e-9 equals the threshold
-#: 2e-18 of double precision. The conversion of 2e-18 itself would give a larger threshold; the energy error of 1e5
-#: steps of Hénon–Heiles would then be 2e-5 instead of 5e-7.
+#: Threshold for the end of sweeps in single precision, which `phigen.targets.c.real.threshold` converts to 1e-9.
+#: Relative to the rounding error of its precision, 1e-9 is about as large as 2e-18, the threshold in double precision.
+#: If 2e-18 were converted, the threshold would be larger, and the energy error of 1e5 steps of Hénon–Heiles would be
+#: 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
 #: Threshold for the end of sweeps if the stages of a method are in a loop, not in lanes. It was chosen for the
@@ -142,9 +142,9 @@ def with_frames(program: Program) -> Program:
     """Return the program with the step of `Gauss.lifted`, if the solver can use it; else return the program
     unchanged.
 
-    This step has frames of group elements that change from step to step. It is used in double precision, if single
-    trajectories have their stages in SIMD lanes and ensembles are not integrated in batches. A batch has no frames, and
-    its steps must equal those of single trajectories.
+    In the step of `Gauss.lifted`, group elements have frames, and the frames change from step to step. This step is
+    used in double precision, if single trajectories have their stages in SIMD lanes and ensembles are not integrated in
+    batches. A batch has no frames, and its steps must equal those of single trajectories.
     """
     step = program.step.lifted
     lanes = in_lanes(program) if step else None

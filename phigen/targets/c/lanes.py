@@ -45,8 +45,8 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: Number of derivatives from which the increment of a stage is predicted. They are the derivatives at the starts of the
-#: next step, of the present step, and of earlier steps.
+#: Number of derivatives from which the increment of a stage is predicted: the derivatives at the end and the start of
+#: the present step, and at the starts of earlier steps.
 KNOTS = 4
 
 

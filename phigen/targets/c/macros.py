@@ -1,8 +1,8 @@
 """Expansion of macros of the C runtime, so that generated files do not contain these macros.
 
-The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. The second
-difference concerns macros with an empty text that stand in place of the head of a loop which runs once. If a line
-begins with a macro of this kind, the macro is removed, and the body of the loop loses its indentation.
+The macros follow the rules of C, with two differences. First, a macro and its arguments must be on one line. Second,
+the text of a macro may be the head of a loop, and is empty in solvers where this loop runs once. If a line begins with
+a macro whose text is empty, the macro is removed, and the body of the loop loses its indentation.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Members of two structs of the C runtime, for a lattice and for a row segment, in blocks with their initialisation."""
+"""Members of two structs of the C runtime: the struct of a lattice, and the struct of a row segment. Each block of
+members has the statements that initialise them.
+"""
 
 from __future__ import annotations
 
@@ -294,9 +296,9 @@ LATTICE = (
     ),
 )
 
-#: Members of the C struct that describes a segment of a row of sites, in blocks that depend on features. Loops over the
-#: sites of the segment receive the struct as an argument. The statements in ``reset`` initialise the struct for a whole
-#: row of a solver s.
+#: Members of the C struct that describes a row segment, in blocks that depend on features. Loops over the sites of the
+#: segment receive the struct as an argument. The statements in ``reset`` initialise the struct for a whole row of a
+#: solver s.
 ROW = (
     StateBlock(
         "x",

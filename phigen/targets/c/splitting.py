@@ -59,7 +59,8 @@ def printed(program: Program, step: Splitting) -> str:
 def _functions(program: Program, step: Splitting) -> FlowFunctions:
     """Return the builder of the functions of flows.
 
-    With a monitor, flows update two more values: the time, and a sum that becomes NaN outside the domain of the flows.
+    With a monitor, flows update two more values: the physical time, and a sum that becomes NaN where the logarithms of
+    the monitor are not defined.
     """
     along = program.dimension + (2 if program.monitor else 0)
     return FlowFunctions(program.dimension, along, turns=bool(program.attitude), stores=bool(step.adjoint))

@@ -1,6 +1,8 @@
-"""The blocks of `phigen.targets.state` and of similar lists as files that the C runtime includes.
+"""Files that the C runtime includes: members of structs, and statements that copy, restore or reset these
+members.
 
-The files have members of structs, and statements that copy, restore or reset these members.
+The texts come from lists of `StateBlock` in `phigen.targets.state`, `phigen.targets.c.row_state` and
+`phigen.targets.c.structs`.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ from phigen.targets.state import STATE, StateBlock, belongs
 
 @dataclass(frozen=True)
 class Part:
-    """File that the runtime includes. For each of the ``blocks``, it has the lines that ``lines`` returns; ``indent``
-    is the indentation of these lines.
+    """File that the runtime includes. It consists of the texts ``lines(block)`` of all ``blocks``, indented by
+    ``indent`` spaces.
     """
 
     blocks: Sequence[StateBlock]

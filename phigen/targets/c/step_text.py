@@ -32,10 +32,10 @@ class StepText:
     also receive the program, the lanes and the switches.
 
     ``texts`` returns files that the runtime includes. ``declared`` returns the sizes that are declared with the struct
-    of the solver. ``constants`` returns sizes that are printed before the sizes of SIMD lanes, and ``last_constants``
-    sizes that are printed after these. Kernels are printed in this order: ``kernels``, the kernels of the gauge and the
-    monitor, ``tangents``, ``transposes``. ``trail`` returns the number of values that a step stores on the tape.
-    ``packed`` prints the kernels for SIMD batches of members.
+    of the solver. ``constants`` and ``last_constants`` return further sizes; the sizes of SIMD lanes are printed
+    between them. Kernels are printed in this order: ``kernels``, the kernels of the gauge and the monitor,
+    ``tangents``, ``transposes``. ``trail`` returns the number of values that a step stores on the tape. ``packed``
+    prints the kernels for SIMD batches of members.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}

@@ -20,8 +20,7 @@ _COEFFICIENTS = [f"const {real} {end}" for real in ("double", "float") for end i
 
 
 def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[str]:
-    """Return the lines of a solver with qualifiers for devices. Only the part of the file for devices is
-    changed.
+    """Return the lines of a file with qualifiers for devices. Lines before `DEVICES_ONLY` are not changed.
 
     Functions get the qualifier `NAME_FUNCTION`, which contains the word static; tables get `NAME_CONSTANT`. Kernels are
     not changed, since the runtime declares them with their qualifiers. If all members may have ``common`` coefficients,

@@ -15,8 +15,8 @@ _NOISE_ARGUMENTS = """ The random
     the numbers of all members; the first step has the number step0. If increments are given, with the shape (steps,
     increments) or (steps, members, increments), they replace random increments of the noise."""
 
-#: Sentences for docstrings in generated modules. Their subjects are the gauge, the energy level, and steps of equal
-#: size in tau, where tau is the time of a monitor.
+#: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in the
+#: time tau of a monitor.
 _OF_GAUGE = """gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
     is a Poisson map for each fixed gauge."""
 _OF_LEVEL = "gauge replaces the energy level e = -H(x0): the step is a Poisson map for each fixed e."

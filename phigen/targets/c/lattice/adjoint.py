@@ -84,13 +84,13 @@ class _Pulled:
 
     The kernel reads the cotangents of the outputs of the original kernel, as symbols of the kind ``seed``. These
     cotangents are in the arrays with the numbers ``bars``. If ``bars`` is empty, they are in the arrays ``varied`` of
-    the row record. ``gather`` has the sums that the kernel reads. ``ends`` has three items for each of these sums: its
-    kernel, the parameters that change sign at the end b of a bond, and its transpose. ``before`` are statements that a
-    row segment executes before the calls.
+    the row record. ``gather`` has the sums that the kernel reads. ``ends`` has three items for each loop that computes
+    these sums: the bonds or pairs with their kernel, the parameters that change sign at the end b of a bond, and the
+    transpose of the kernel. ``before`` are statements that a row segment executes before the calls.
 
     The fields ``recomputed`` are recomputed by the kernel or, if ``undo`` is set, by the kernel ``undo``. The kernel
-    ``undo`` reads sums that the transposes over bonds or pairs compute. ``taken`` are the contributions of the previous
-    flow of the reverse pass, which the transposed kernel adds.
+    ``undo`` reads sums that the transposes over bonds or pairs compute. ``taken`` are contributions of the previous
+    flow of the reverse pass, which the transposed kernel adds to the cotangents.
     """
 
     kernel: Kernel
@@ -263,10 +263,12 @@ class _Reverse(RowLoops):
             yield self._transpose_traversals(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
     def _transpose_traversals(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
-        """Return the traversals of some transposed kernels.
+        """Return the calls of some transposed kernels for a row segment, in two traversals of the sites (see the head
+        of this file).
 
-        If ``apart``, the second traversal adds contributions in a separate loop called ``name``. Otherwise the first
-        traversal of the next flow adds them. ``whom`` says in the comment of the loop which sites have contributed.
+        The first traversal stores contributions to the cotangents of other sites. If ``apart``, a separate loop called
+        ``name`` adds them in the second traversal. Otherwise the next flow of the reverse pass adds them. ``whom`` is a
+        part of the comment on the loop: it says which neighbours have contributed.
         """
         layout, loops = self.layout, list[ir.Function]()
         first, second = list[ir.Statement](), list[ir.Statement]()
@@ -281,8 +283,8 @@ class _Reverse(RowLoops):
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
             """Return the calls of a transposed kernel for a row segment.
 
-            If the kernel calls functions such as sin that have one version for small and one for all arguments, there
-            are two calls, one for each version.
+            The kernel may call functions such as sin that have two versions: one for small and one for all arguments.
+            Then there are two calls of the kernel, one for each version.
             """
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
             on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)
@@ -374,8 +376,8 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """Return the fields and parameters that the transposed kernels read. The kernels read the values from before the
-    sweep.
+    """Return the names of the fields and parameters that transposed kernels read. The kernels read their values before
+    the sweep.
     """
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}

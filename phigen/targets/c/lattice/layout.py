@@ -24,8 +24,8 @@ from phigen.scheme.sweep_inverse import can_recompute_fields
 from phigen.targets import lattice_values
 from phigen.targets.c.language import members
 
-#: Largest number of differences in the predictors of all stages together. Further differences gain little, and each
-#: needs an array over all sites.
+#: Largest number of backward differences that the predictors of all stages store together. Further differences gain
+#: little, and each needs an array over all sites.
 MOST_REMEMBERED = 14
 
 

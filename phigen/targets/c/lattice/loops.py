@@ -65,7 +65,7 @@ def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
 
 
 def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
-    """Return the parameters and statements of a loop. Loops with equal parameters and equal statements do the same."""
+    """Return the parameters and statements of a loop. Loops for which these are equal have equal code."""
     return loop.parameters, loop.body
 
 

@@ -103,7 +103,8 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
     """Return the number of arrays over the sites in the memory of a solver, including the fields and parameters."""
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
-        # y before and after a sweep; without kernels of derivatives along variations, a perturbed y for differences
+        # y before and after a sweep; without kernels of derivatives along variations, also a perturbed y for difference
+        # quotients
         stage = 2 if layout.slopes else 3
         stage += len(program.fractions) * _differences(program) * has["SWEEP_PREDICTORS"]
         stage += (
@@ -126,20 +127,20 @@ def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
 
 
 def rows_of(step: Sweeps) -> int:
-    """Return the number of rows of coefficients.
-
-    There is one row for each flow of a step. There is one more row if the last flow of a step is merged with the first
-    flow of the next step.
+    """Return the number of rows of coefficients: one for each stage or, in a splitting, one for each item of
+    `_flows`.
     """
     return len(step.schedule.times) if step.equation else len(_flows(step))
 
 
 def _flows(step: Sweeps) -> list[tuple[int, int]]:
-    """Return the flows for which there are coefficients, as pairs (part, row of the schedule).
+    """Return the flows for which there are coefficients, as pairs: a part, and an index in the ``times`` of the
+    schedule.
 
-    Without noise, the first flow occurs once more at the end, for the merger of the last flow of a step with the first
-    flow of the next step. With noise, flows are not merged, since each flow has its own increments. Flows before and
-    after a run come last.
+    The list begins with the flows of one step. If the method has a corrector, the flows at the start of a run follow,
+    then the flows at its end. If there is neither a corrector nor noise, the first flow of a step occurs once more: it
+    stands for the last flow of a step, merged with the first flow of the next step. With noise, flows are not merged,
+    since each flow has its own increments.
     """
     flows = step.schedule.flows
     if step.corrected:
@@ -148,8 +149,8 @@ def _flows(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
-    """Return one value for each flow of `_flows`. ``values`` has a value for each row of the schedule. The flow that
-    results from merging two flows has the value ``joined``.
+    """Return one value for each flow of `_flows`. ``values`` has a value for each row of the schedule. If the last flow
+    of a step is merged with the first flow of the next step, the merged flow has the value ``joined``.
     """
     by_flow = [values[row] for _, row in _flows(step)]
     return by_flow if step.sites.increments or step.corrected else [*by_flow[:-1], joined]

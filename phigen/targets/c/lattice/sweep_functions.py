@@ -89,7 +89,8 @@ class _Call:
     If ``order`` is not empty, the loop reads the fields in this order. If ``bonds`` is not empty, it reads the
     parameters at bonds in this order. Before the call, two values are stored in the record of the segment: the
     ``colour`` of the sweep, and its ``window``, the set of boundary seams that the sweep treats. ``shared`` is the name
-    of the loop if several parts of H call it. ``others`` are calls that may replace this one.
+    of the loop if several parts of H call it. ``others`` are calls of other loops with the same effect, one of which
+    may replace this call.
     """
 
     loop: ir.Function
@@ -110,7 +111,9 @@ Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 @dataclass(frozen=True)
 class _PartLoops:
-    """The loops and row drivers of all parts of H. Without ``rows``, they compute derivatives of the flows."""
+    """The loops and row drivers of all parts of H. If ``rows`` is None, they compute the derivatives of the flows along
+    variations, else the flows themselves.
+    """
 
     loops: RowLoops
     rows: Rows | None
@@ -356,7 +359,7 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
 def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
     """Yield the text of the loops, and of the row driver, of a kernel of a stage.
 
-    The driver of the equation also applies the kernel ``end``, which updates x at the end of a stage.
+    If ``end`` is passed, the row driver also applies this kernel, which updates x at the end of a stage.
     """
     program, layout = loops.program, loops.layout
     adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
