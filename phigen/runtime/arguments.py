@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface
 from phigen.runtime.members import Members
 
-#: Largest number of steps: the largest integer of NumPy, which has 64 bits with a sign. The C counts without a sign.
+#: Largest number of steps: the largest signed integer of 64 bits. NumPy stores step numbers as signed integers.
 _MOST = int(np.iinfo(np.int64).max)
 
-#: Largest finite number in single precision, the range of states and parameters in C with ``real: float``.
+#: Largest finite number in single precision. States and parameters of C with ``real: float`` cannot be larger.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 #: Largest values of the arguments that select random numbers: the largest values of the integer types that store them.
@@ -101,8 +101,8 @@ def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
 def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
     """Return the initial time ``t0`` of a trajectory; the default is 0.
 
-    If the Hamiltonian does not depend on the time, a parameter may have the name t0. Its value is then added to
-    ``by_keyword``.
+    If the Hamiltonian does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. It is
+    then added to ``by_keyword``, and 0 is returned.
     """
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
@@ -115,7 +115,8 @@ def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, flo
 def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
     """Return the selection of random numbers, from the arguments seed, member and step0.
 
-    If the system has no noise, parameters may have these names. Their values are then added to ``by_keyword``.
+    If the system has no noise, seed, member and step0 can only be names of parameters. The values of these parameters
+    are then added to ``by_keyword``.
     """
     selected = {name: value for name, value in selections.items() if value is not None}
     if interface.noise:
@@ -129,7 +130,7 @@ def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[
 
 
 def increments(values: ArrayLike, interface: Interface) -> Floats:
-    """Return prescribed increments of the noise as an array (steps, draws).
+    """Return prescribed increments of the noise as an array: one row for each step, with all increments of the step.
 
     Raises `TypeError` if the system has no noise, and `ValueError` for other shapes and for values that are not finite.
     """
@@ -144,9 +145,9 @@ def increments(values: ArrayLike, interface: Interface) -> Floats:
 
 
 def expect_no_noise(argument: str, interface: Interface) -> None:
-    """Raise `TypeError` if the system has noise. Called for arguments that need shortened steps.
+    """Raise `TypeError` if the system has noise: a shorter step would draw other random numbers than a whole step.
 
-    Shorter steps would use other random numbers than whole steps.
+    ``argument`` is the name of the argument that needs a shorter step.
     """
     if interface.noise:
         raise TypeError(f"{argument} is not available with noise: a shorter step would draw other random numbers")
@@ -321,8 +322,7 @@ def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
-    """Return the initial attitudes and positions of all members as an array (members, numbers): attitude, then
-    position.
+    """Return an array with a row for each member: the numbers of its initial attitude, then its initial position.
 
     ``attitude0`` and ``position0`` are single values for all members, or have a first axis of members. The defaults are
     the identity and the origin.

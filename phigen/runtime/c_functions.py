@@ -21,8 +21,8 @@ _SIGNATURES = {
 }
 
 
-# Signatures for a Hamiltonian that depends on the time; they have the time as an additional argument. They replace the
-# signatures above that have the same names.
+# Signatures for a Hamiltonian that depends on the time: the time is an additional argument. Each signature replaces the
+# one above that has the same name.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
@@ -71,7 +71,7 @@ def functions_of(library: Any, interface: Interface) -> Any:
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # members have initial times or gauges, an additional argument
+    if interface.time or "init_gauge" in offered:  # an additional argument has the times or gauges
         _, signature_each = _EXTRAS["ensemble_each"]
         offered |= (
             {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}

@@ -44,8 +44,9 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Signatures of additional functions. Lattices whose H depends on the time have ``_IN_TIME`` or, if they are graphs,
-#: ``_GRAPH_IN_TIME``. Lattices with noise have ``_NOISY``.
+#: Signatures of additional functions. ``_IN_TIME`` is for lattices, except graphs, whose H depends on the time.
+#: ``_GRAPH_IN_TIME`` is for graphs whose H depends on the time. ``_NOISY`` is for lattices with noise. Each of the
+#: three contains ``_PASSED``.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
@@ -77,14 +78,14 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "resume_clock": (_INT, (_POINTER, _POINTER)),
 }
 
-#: Least size of a tape, in numbers: 2 MiB in double precision, the size of a core's cache.
+#: Least number of values for which a tape has room. In double precision they take 2 MiB, the size of a core's cache.
 MIN_TAPE_VALUES = 1 << 18
 
 #: Least number of states that a tape can store. The reverse pass recomputes the steps between two stored states.
 MIN_CHECKPOINTS = 8
 
-#: Number of steps over which the space on the tape for one step is averaged. Steps differ, since several steps may
-#: share one stored state.
+#: The size of the tape per step is an average over this number of steps. One step does not suffice, since several steps
+#: may share one stored state.
 MEASURED_STEPS = 64
 
 #: Largest size of a tape in bytes (64 MiB), unless `MIN_TAPE_VALUES` or `MIN_CHECKPOINTS` needs more.
@@ -248,9 +249,7 @@ class CLatticeSession:
         return self._filled(self._c.observed_fields, shape) if shape[0] else np.empty(shape)
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays with which `resume` continues this integration with the same bits. `resume` also needs the
-        state.
-        """
+        """Return the arrays that `resume` needs, besides the state, to continue this integration bit for bit."""
         if not hasattr(self._c, "saved"):
             return {}
         clock = self._clock()
@@ -387,10 +386,10 @@ class CLattice:
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order. Without noise, one more sweep follows.
+        """Return the sweeps of a step, in order. Without noise, the list has an additional sweep at its end.
 
-        This additional sweep does the work of two: of the last sweep of a step and of the first sweep of the next step.
-        Raises `ValueError` if the C has no caller-driven stepping.
+        The additional sweep replaces two sweeps: the last sweep of a step, and the first sweep of the next step. Raises
+        `ValueError` if the C has no caller-driven stepping.
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(

@@ -427,7 +427,7 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return a list of arguments for ``zip``: the list of times, or nothing if there are no times."""
+    """Return a list that contains the list of the times ``t``; the empty list if ``t`` is None."""
     return [] if t is None else [t.tolist()]
 
 

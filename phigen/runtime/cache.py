@@ -38,10 +38,9 @@ _SCRATCH_LIFETIME = 3600.0  # seconds; compilations take minutes, so an older fo
 
 
 def directory() -> Path:
-    """Return the folder of the cache: that in PHIGEN_CACHE_DIR or, by default, a folder among the user's
-    caches.
+    """Return the folder of the cache, which may not exist yet.
 
-    The folder may not exist yet.
+    The environment variable PHIGEN_CACHE_DIR names the folder. By default it is ``phigen`` in the user's cache folder.
     """
     configured = os.environ.get("PHIGEN_CACHE_DIR")
     if configured:

@@ -42,8 +42,7 @@ _MOST_NEWTON = 8
 #: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps. The first of these numbers with which no step
 #: fails is used: a single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Absolute tolerance for the position of a zero, as a fraction of a step. A smaller difference does not change the
-#: state.
+#: Tolerance for the fraction θ of a step at which g vanishes. A smaller change of θ does not change the state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
 #: Direction of a crossing → signs s for which s·g increases through zero as time increases.
@@ -334,11 +333,10 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the zero of g in a step as a pair: the fraction of the step, and a session at the zero. Return None
-        without a zero.
+        """Return the zero of g in a step as a pair: the fraction of the step, and a session at the zero.
 
-        Newton's method starts from the zero on the collocation polynomial. The iteration may not converge at a double
-        zero of g.
+        The result is None if no zero is found. Newton's method starts from the zero on the collocation polynomial. The
+        iteration may not converge at a double zero of g.
         """
         fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
         value_before, value_after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])

@@ -53,7 +53,7 @@ class Interface:
     nonnegative: frozenset[str] = frozenset()  # the parameters that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
-    moving: frozenset[str] = frozenset()  # quantities (``energy``, Casimirs) that vary due to explicit time or forces
+    moving: frozenset[str] = frozenset()  # ``energy`` and Casimirs, if forces or a time-dependent H change their values
     monitored: bool = False  # whether a monitor rescales time by dt = g dτ: steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
     position: bool = False  # whether the spec reconstructs a position too

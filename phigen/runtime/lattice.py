@@ -105,9 +105,7 @@ class LatticeSession(Protocol):
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays with which `resume` continues this integration with the same bits. `resume` also needs the
-        state.
-        """
+        """Return the arrays that `resume` needs, besides the state, to continue this integration bit for bit."""
         ...
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -402,10 +400,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), a
     parameter at bonds an array (bonds,); one number holds for all sites or bonds. Parameters that are not passed have
-    the defaults of the spec, evaluated at the sizes of the state. `SpecError` is raised if a default is a list or a
-    file with another number of values. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of
-    sites from 0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several
-    threads may use a solver.
+    the defaults of the spec, evaluated at the sizes of the state. `SpecError` is raised if a default, a list or a file,
+    does not have one value for each site or bond. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of
+    site numbers, which begin at 0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step
+    `phigen.StepError`. Several threads may use a solver.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -448,19 +446,20 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         Frames are the states after every ``stride``-th step and after the last. With ``until`` in place of ``steps``,
         the last step is shortened to end at that time. A step that fails is repeated as 2, 4, …, up to 2**retry smaller
-        steps. Together, these are a Poisson map, but not the map of one whole step. With a monitor (dt = g dτ), ``h``
-        is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
+        steps. The composition of the smaller steps is a Poisson map, but not the map of the whole step. With a monitor
+        (dt = g dτ), ``h`` is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
 
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
         numbers of a site are a function of ``seed``, ``member``, the site, and the number of the step, where ``step0``
-        is the number of the first step. With ``output``, a path that ends in .npy or .npz, frames are written to that
-        file one by one; a path that ends in .csv is written at the end, if a state has at most 1,000 numbers.
+        is the number of the first step. ``output`` is the path of a file for the frames. If the path ends in .npy or
+        .npz, frames are written one by one. If it ends in .csv, all frames are written at the end, and a state may have
+        at most 1,000 numbers.
 
-        With ``checkpoints``, a path, the state is saved there at every frame; a call with the same arguments resumes
-        from that state. The file is removed at the end of the run. ``resume=False`` starts a new run, and refuses to
-        overwrite the files of an interrupted one. ``progress`` is called after each frame with the number of steps
-        done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step. Raises `ValueError`
-        if the files belong to an interrupted run, or to a complete run, which cannot be resumed.
+        ``checkpoints`` is the path of a file in which the state is saved at every frame. A call with the same arguments
+        resumes from that state. The file is removed at the end of the run. ``resume=False`` starts a new run, and
+        refuses to overwrite the files of an interrupted one. ``progress`` is called after each frame with the number of
+        steps done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step. Raises
+        `ValueError` if the files belong to an interrupted run, or to a complete run, which cannot be resumed.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -685,9 +684,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Integrate as `integrate` does, but record a few numbers every ``stride`` steps instead of states.
 
         ``of`` names the numbers: ``energy``, Casimirs that are sums or products over sites, and observables; by default
-        all of these except the Casimirs. With ``output``, a path that ends in .csv or .npz, the numbers are written to
-        that file at the end. With ``checkpoints`` the state and the rows are saved every two seconds. Raises the errors
-        of `integrate`; the ``trajectory`` of a `StepError` is the series up to the failure.
+        the energy and all observables. ``output`` is the path of a file, .csv or .npz, to which the numbers are written
+        at the end. With ``checkpoints`` the state and the rows are saved every two seconds. Raises the errors of
+        `integrate`; the ``trajectory`` of a `StepError` is the series up to the failure.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -977,7 +976,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def observables(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> dict[str, Any]:
-        """Return the values, at a state, of the observables of the spec, by name.
+        """Return the observables of the spec at a state, by name.
 
         Observables with a value at each site are arrays (*sizes), all others are numbers.
         """
@@ -1067,10 +1066,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return values | bonds
 
     def defaults(self, passed_values: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
-        """Return the default values that depend on the sizes, of parameters missing in ``passed_values``.
+        """Return default values of parameters that are missing in ``passed_values``, by name.
 
-        These defaults are formulas, lists, files or random numbers. Raises `SpecError` if a default does not fit the
-        sizes.
+        Only defaults that depend on the sizes are returned: formulas, lists, files and random numbers. Raises
+        `SpecError` if a default does not fit the sizes.
         """
         missing_names = self.interface.required - set(passed_values)
         if not missing_names:

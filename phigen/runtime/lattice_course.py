@@ -1,5 +1,5 @@
-"""Integrations of lattices that can be copied. A copy is needed to locate a crossing, to repeat a step in smaller
-steps, and to end a run or store a row inside a step.
+"""Integrations of lattices. An integration can be copied. A copy is needed to locate a crossing, to repeat a step in
+smaller steps, and to end a run or store a row inside a step.
 """
 
 from __future__ import annotations
@@ -164,10 +164,10 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """An integration whose `state` is the array (observables,) of the observables of the spec, as sections and stops
-    need it.
+    """An integration whose method `state` returns the observables of the spec, an array (observables,).
 
-    A failing step is repeated as several smaller steps, see `Retrying`.
+    The section and the end (``stop``) of a run are zeros of functions of observables. A failing step is repeated as
+    several smaller steps, see `Retrying`.
     """
 
     def state(self) -> Floats:

@@ -99,8 +99,8 @@ def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], 
     """Return the initial states (members, coordinates, *sizes) from ``X0``. Raises `ValueError` for other
     shapes.
 
-    ``per_member`` has, by name, the values of those other arguments that have an axis of members. If ``per_member`` is
-    not empty, ``X0`` may be one state, with which all members start.
+    ``per_member`` maps the names of other arguments with an axis of members to their values. If there are any, ``X0``
+    may be one state, from which all members start.
     """
     axes = 1 + len(solver.interface.axes)
     member_states: Iterable[Floats]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: (WHOLE).
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
-#: Largest number of columns of a table of states. Programs for tables only show some hundreds of columns.
+#: Largest number of columns of a ``.csv`` file with states, since programs for tables are not made for wider files.
 MAX_COLUMNS = 1000
 
 

@@ -1,5 +1,5 @@
-"""Derivatives of runs of lattices in reverse mode: for one run, or for an ensemble with parameters that differ by
-member.
+"""Derivatives of runs of lattices in reverse mode: for one run, or for an ensemble whose members have different
+parameters.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class LiveSession:
     name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to
     ``x`` change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters`
     changes parameters. With a monitor, each of these changes sets the energy level e to −H of the present state.
-    ``copy()`` returns an independent session. A session that was pickled and loaded continues with the same bits.
+    ``copy()`` returns an independent session. A session that was pickled and loaded continues bit for bit.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class LiveSession:
     def kick(self, change: ArrayLike) -> Self:
         """Add ``change`` (DIM,) to the state, as an impulse does, and return the session.
 
-        If the new state has other Casimirs, the property `leaf` returns these from then on.
+        From then on, the property `leaf` returns the Casimirs of the new state.
         """
         self._move(self._session.kick, self._checked(change, "change"))
         return self

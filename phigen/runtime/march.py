@@ -27,8 +27,8 @@ class Piece:
 
     ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step. ``x``
     (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). ``passed`` (rows,) is the physical
-    time since the start if there is a monitor, and NaN otherwise. ``turned`` (rows, numbers) are attitudes and
-    positions.
+    time since the start if there is a monitor, and NaN otherwise. A row of ``turned`` has the components of an attitude
+    and a position.
     """
 
     numbers: Floats
@@ -38,7 +38,7 @@ class Piece:
     turned: Floats
 
 
-#: Data of a row besides its state: the physical time since the start (NaN without a monitor), and the numbers of its
+#: Data of a row besides its state: the physical time since the start (NaN without a monitor), and the components of its
 #: attitude and position.
 Mark = tuple[float, Floats]
 
@@ -191,9 +191,9 @@ def _states(
     """Advance a session until it has made ``target`` steps. For each block, yield (number, states, marks,
     crossings).
 
-    The number is the step number of the first state. Each state has a mark, a `Mark`. With a finder or with
-    ``see_tangent``, the states after all steps of the block are yielded; otherwise those after every ``stride``-th step
-    and the last.
+    The number is the step number of the first state. There is one `Mark` for each state. With a finder or with
+    ``see_tangent``, the states after all steps are yielded. Otherwise only the states after every ``stride``-th step
+    and after the last step are yielded.
     """
     marks: list[Mark] = []
 

@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: Ensembles are divided into parts. The number of members in each part but the last is a multiple of this number, and
-#: so of every SIMD width. Each member is then in the same SIMD batch, and has the same bits, for any number of parts.
+#: Ensembles are divided into parts. The number of members in each part but the last is a multiple of this number, which
+#: is a multiple of every SIMD width. So SIMD batches, and the bits of results, do not depend on the number of parts.
 PART_GRANULARITY = 32
 
 #: Smallest number of steps, summed over members, for which another thread is started. Fewer steps take less time than
 #: the start of a thread.
 _STEPS_PER_THREAD = 20_000
 
-#: One call of C integrates up to _MEMBERS_PER_CALL members. If each member makes few steps, a call may integrate a
-#: multiple of this number, with at most _STEPS_PER_CALL steps of all its members together. Python handles Ctrl-C only
-#: between calls.
+#: One call of C integrates up to _MEMBERS_PER_CALL members. If members make few steps, the call may integrate a
+#: multiple of this number, with at most _STEPS_PER_CALL steps in total. Calls are short, since Python handles Ctrl-C
+#: only between two calls.
 _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 
@@ -36,8 +36,8 @@ _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 class Members:
     """Arguments of an ensemble: initial states (members, DIM), and ``h``, ``t0`` and parameters, as arrays.
 
-    An array of shape () holds for all members. An array (members,) has a value for each member. ``paths`` (members,),
-    with the seed and the first step of ``draws``, select the random numbers of each member. The states after every
+    An array of shape () holds for all members. An array (members,) has a value for each member. The random numbers of
+    member m are selected by ``paths[m]``, and by the seed and the first step of ``draws``. The states after every
     ``stride`` steps are stored. If ``stride`` is 0, only the final states are stored.
     """
 
@@ -110,8 +110,8 @@ def cores() -> int:
 def parts(members: Members, threads: int) -> Iterator[slice]:
     """Yield the parts of an ensemble, as slices of its members; each part is integrated by one call of C.
 
-    Parts are short, since Python handles Ctrl-C only between two calls. With several threads there are about four parts
-    for each thread, or more, if there are enough members.
+    Parts are short, since Python handles Ctrl-C only between two calls. If there are enough members, each of several
+    threads gets about four parts or more.
     """
     count = len(members)
     batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL

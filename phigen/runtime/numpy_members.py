@@ -183,8 +183,8 @@ class MemberBatch:
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
-        # The axis of members is the last but one, or the first: arrays are (members, DIM) or, in Gauss methods,
-        # (unknowns, members, stages).
+        # Predictors are arrays (members, DIM) or, in Gauss methods, (unknowns, members, stages). So the axis of members
+        # is the last axis but one. An array with one axis has only the axis of members.
         self._memory = [
             (np.take(a, remaining, max(a.ndim - 2, 0)), np.take(b, remaining, max(b.ndim - 2, 0)))
             for a, b in self._memory

@@ -65,7 +65,7 @@ class AttitudeState(NamedTuple):
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Return the name under which a saved session has part 0 or 1 of the predictor of a stage."""
+    """Return the name of an array in saved sessions: the first (0) or second (1) array of the predictor of a stage."""
     return f"memory_{stage}_{part}"
 
 
@@ -129,7 +129,7 @@ class NumpySession:
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
         element = None if self._turned is None else self.element()
         self._x, self._carry = x, carry
-        if monitored:  # the gauge is the energy level e = -H
+        if monitored:  # then the function `gauge` returns the energy level e = −H
             self._gauge = self._module.gauge(x[0], **self._parameters)
             if np.isfinite(self._h):
                 self._stages = self._new_stages()
@@ -146,7 +146,7 @@ class NumpySession:
         element = None if self._turned is None else self.element()
         self._t, self._counted = self._now(), self.steps
         self._parameters = dict(parameters)
-        if monitored:  # the gauge is the energy level e = -H
+        if monitored:  # then the function `gauge` returns the energy level e = −H
             self._gauge = self._module.gauge(self._x[0], **self._parameters)
         self._h, self._stages, self._memory = np.nan, [], []
         if element is not None:

@@ -133,8 +133,9 @@ class Propagation:
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
         """Return the derivatives of the result of `run` with respect to x0 and, by name, to each parameter.
 
-        The first has the shape of the result and a last axis (DIM,), the others have the shape of the result. Each
-        component of a member's result takes one reverse pass. Solvers of lattices have no Jacobian.
+        Derivatives with respect to a parameter have the shape of the result. The derivative with respect to x0 has a
+        further last axis (DIM,). One reverse pass is made for each component of a member's result. Solvers of lattices
+        have no Jacobian.
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))

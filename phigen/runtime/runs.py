@@ -1,7 +1,7 @@
 """Runs that a spec names, for `Solver.run` and `LatticeSolver.run`: their settings, ends and rows.
 
-`changed` returns a run of a spec with other settings. `rows_of` integrates runs of ordinary systems that the arguments
-of `Solver.integrate` cannot describe: runs that stop at a zero of a function, and runs with rows at given times.
+`changed` returns a run of a spec with other settings. `rows_of` integrates two kinds of runs of ordinary systems, for
+which `Solver.integrate` has no arguments: runs that stop at a zero of a function, and runs with rows at given times.
 """
 
 from __future__ import annotations

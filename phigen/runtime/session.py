@@ -33,7 +33,7 @@ class Course(Protocol):
         ...
 
     def branch(self) -> Self:
-        """Return an independent copy, which continues with the same steps."""
+        """Return an independent copy, whose further steps have the same results."""
         ...
 
 

@@ -104,14 +104,15 @@ class Solver(Named[Backend, Interface]):
         A negative ``h`` integrates backwards in time; with a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ.
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of
         ``steps``, the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry
-        smaller steps. Together, these are a Poisson map that keeps the Casimirs, but not the map of one whole step.
+        smaller steps. Their composition is a Poisson map that keeps the Casimirs, but not the map of the whole step.
         ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by default the identity
         and the origin.
 
         With noise, the random numbers are a function of ``seed``, ``member`` and the number of the step, where
-        ``step0`` is the number of the first step; all three are 0 by default. Increments of the noise can be passed as
-        ``increments`` (steps, draws) instead. ``progress`` is called from time to time with the number of steps done.
-        Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
+        ``step0`` is the number of the first step; all three are 0 by default. Instead, increments of the noise can be
+        passed as ``increments``, an array with a row of increments for each step. ``progress`` is called from time to
+        time with the number of steps done. Raises `StepError`, whose ``trajectory`` ends with the state before the
+        failing step.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments, (attitude0, position0))
@@ -171,7 +172,7 @@ class Solver(Named[Backend, Interface]):
         Arguments replace settings of the spec. ``x0`` (DIM,) is the initial state, ``step`` the step size. The run ends
         after ``steps`` steps or at the time ``until``; a run with ``stop`` ends at the first zero of the expression
         ``stop``. Rows are stored every ``stride`` steps, at intervals of ``every``, or at the times ``at``. ``seed`` is
-        that of the noise. Parameters, and initial values of coordinates, are given by name. Raises `ValueError` if
+        the seed of the noise. Parameters, and initial values of coordinates, are given by name. Raises `ValueError` if
         there is no run of that name; `runs` lists the names.
         """
         spec, settings = self.spec, runs.Settings(step, steps, until, stride, every, at=at)

@@ -18,8 +18,8 @@ from phigen.targets.header import plain
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
-#: Names in gcc's call graph that stand for calls through pointers: the name of all such calls in the solver, and the
-#: beginning of the names of OpenMP's functions, which call functions through pointers.
+#: Beginnings of names in gcc's call graph that stand for calls through pointers: gcc's name for a call through a
+#: pointer, and the prefix of OpenMP's functions, which call functions through pointers.
 _BY_POINTER = ("__indirect_call", "GOMP_")
 _TIMEOUT = 300.0  # time limit of a command of the compiler, in seconds
 

@@ -29,8 +29,8 @@ BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 
 #: Flags for this processor; a flag that the compiler does not accept is left out. Fused multiply-adds change results by
 #: round-off only: the compensated sums of the generated code contain no product that could be fused. The generated code
-#: does not read floating-point exceptions, so traps are off. If traps were on, gcc could not divide by 0 in a SIMD lane
-#: whose value is not used. It would then not vectorise loops over pairs on processors without AVX-512.
+#: does not read floating-point exceptions, so traps are off. A SIMD lane whose value is not used may therefore divide
+#: by 0. With traps, gcc would not vectorise loops over pairs on processors without AVX-512.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 
 #: Flag of compilers for code with OpenMP threads, which only solvers of lattices use.

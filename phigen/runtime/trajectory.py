@@ -128,9 +128,9 @@ class Trajectory:
 
     @property
     def moving(self) -> frozenset[str]:
-        """The names (``energy``, names of Casimirs) of quantities that explicit time or forces change.
+        """Names of the quantities (``energy``, Casimirs) that are not constant, due to forces or a time-dependent H.
 
-        Figures show the values of these quantities instead of errors, since their changes are not errors.
+        Figures show the values of these quantities instead of errors, since changes of the values are not errors.
         """
         return self.solver.interface.moving if self.solver else frozenset()
 

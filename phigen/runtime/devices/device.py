@@ -34,7 +34,7 @@ class Device(Protocol):
     group: int  # largest number of work items in a group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
-    is_card: bool  # whether the device is a graphics card, where values without a register lie in slow memory
+    is_card: bool  # whether the device is a graphics card: values that do not fit into registers are slow there
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """Return the program compiled from a source text; ``defined`` are preprocessor macros and their values.

@@ -25,7 +25,7 @@ from phigen.runtime.session import Session
 _SHARE = 0.5
 
 #: Largest number of steps for each compute unit in one launch, summed over members. A launch then takes about a second.
-#: Python handles Ctrl-C only between launches, and systems may end kernels that run too long.
+#: Python handles Ctrl-C only between launches, and operating systems may end kernels that run too long.
 _STEPS_PER_UNIT = 1 << 24
 
 #: Smallest number of members for each compute unit in one launch. While one member waits for memory, others compute.

@@ -12,16 +12,16 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Number of values that a work item adds, or reduces otherwise, in one pass. The order of a sum depends only on this
-#: number and on the number of values.
+#: Number of values that a work item reduces to one value, such as their sum, in one pass. The order of the operations
+#: depends only on this number and on the number of values.
 _REDUCED = 64
 
 #: Numbers that tell a kernel how to reduce values. A mean is computed as a sum, and divided afterwards.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
-#: Size of a work group in generated code, unless the macro NAME_GROUP defines another size. With CUDA it is the largest
-#: size of a block.
+#: Number of work items in a group, unless the macro NAME_GROUP defines another number. With CUDA, a block has at most
+#: this number of threads.
 _GROUP = 128
 
 

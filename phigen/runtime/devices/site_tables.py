@@ -1,6 +1,4 @@
-"""Tables of sites, arrays that a lattice has on a device: neighbours, bonds, parameters at sites, selections of
-sites.
-"""
+"""Tables of sites: arrays on a device with neighbours, bonds, parameters at sites, and selections of sites."""
 
 from __future__ import annotations
 
@@ -40,9 +38,9 @@ class SiteTables:
         return int(np.prod(self.sizes))
 
     def selected(self, launch: SiteLaunch) -> tuple[Any, int]:
-        """Return a buffer with the numbers of the sites on which a launch works, and the number of these sites.
+        """Return a buffer with the indices of the sites on which a launch works, and the length of this buffer.
 
-        The buffer is None if the launch works on all sites.
+        If the launch works on all sites, the result is None and the number of sites.
         """
         if launch.colour is None and not launch.inside and launch.window is None:
             return None, self.count
