@@ -22,7 +22,8 @@ from phigen.study.methods import Method
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Number of corrections of the modified Hamiltonian, and largest order of a method for which corrections are computed.
+#: CORRECTIONS: number of corrections of the modified Hamiltonian. MOST_ORDER: corrections are computed only for methods
+#: of at most this order.
 CORRECTIONS, MOST_ORDER = 2, 6
 #: STEPS: number of steps at the largest step size. DOUBLINGS: largest number of times that the step of the run is
 #: doubled to find the largest step size. HALVINGS: number of times that this size is then halved for the measurement.

@@ -60,7 +60,7 @@ class GradedRun:
     bars: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Draw random cotangents ``bars`` of all rows. All targets get the same ones, since the seed is fixed."""
+        """Draw random cotangents ``bars`` of all rows. The seed is fixed, so all targets get equal cotangents."""
         random_bars = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
         object.__setattr__(self, "bars", random_bars / self.units)
 
@@ -204,9 +204,10 @@ _Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
 
 
 def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any]) -> Iterator[tuple[float, _Moved]]:
-    """Yield directional derivatives computed from the gradient, each with the function that displaces the run.
+    """Yield directional derivatives that are computed from the gradient, each with a function for its direction.
 
-    The function returns initial state and parameters, displaced by a distance along the direction.
+    The argument of the function is a distance. The function returns initial state and parameters, displaced by this
+    distance along the direction.
     """
     for v in _directions(len(run.x), _DIRECTIONS) * run.units:
         yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]

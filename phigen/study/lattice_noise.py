@@ -37,8 +37,8 @@ def strong_order(
 
     Errors at the end of a run are measured with the steps h, h/2, h/4, … along the same Wiener paths. The strong order
     is the power of the step size with which these errors decrease. Reference solutions follow the piecewise linear
-    interpolation of a path; they use only the vector fields. ``x0`` has the shape (fields, *sizes). ``paths`` is the
-    number of paths.
+    interpolation of a path; they use only the vector fields. ``x0`` has the shape (coordinates, *sizes). ``paths`` is
+    the number of paths.
     """
     solver = lattice_solver_of(compilation, "numpy")
     noise = compilation.program.noise

@@ -44,8 +44,8 @@ MOST_GRADED = 16384
 MAX_ROUNDING = 1e-11
 #: Number of sites along each axis in measurements of the strong order, for lattices with one, two and three axes.
 SOME = (32, 6, 4)
-#: Number of Wiener paths in measurements of the strong order: with ``quick``, and without. Each site of a lattice
-#: counts as one path.
+#: Number of Wiener paths in measurements of the strong order: with ``quick``, and without. Each site has its own path,
+#: so a run on n sites counts as n paths.
 FEW_PATHS, MANY_PATHS = 32, 96
 #: Sentence on the errors of Casimirs, printed below the table of results.
 WORST_SITE = "For a Casimir at every site, the error is that at the site where the Casimir changed most."
@@ -341,9 +341,9 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"DΦ π DΦᵀ differs from π∘Φ by {defect:.1e}")
-    # Finite differences are computed four times: with two spacings, each in two units. The units are the largest
-    # magnitudes of a field in the run, over all sites and at the site itself. The smallest of the four deviations from
-    # the tangent map counts, since larger deviations are errors of the differences.
+    # Finite differences are computed four times: with two spacings, each in two units. One unit of a coordinate is its
+    # largest magnitude at all sites of the run, the other its largest magnitude at one site. The smallest deviation
+    # from the tangent map counts, since larger deviations are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
@@ -453,9 +453,9 @@ class _SmallLattice:
 
 
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
-    """Return the lattice with finite brackets, and a note.
+    """Return the lattice with parameters for which π is finite, and a note.
 
-    Parameters whose value 0 makes π infinite are replaced by other values. The note, such as ", m = 0.1 for 0", is
+    If a parameter is 0 and therefore makes π infinite, its value is replaced. The note, such as ", m = 0.1 for 0", is
     added to the name of a check; it is "" if nothing was replaced.
     """
     with np.errstate(all="ignore"):
@@ -491,7 +491,7 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 
 
 def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
-    """Return the numbers of the sites of the run whose values a small lattice receives. They are drawn at random.
+    """Return indices of sites of the run, drawn at random. A small lattice receives the values at these sites.
 
     If all sites interact in pairs, the first site is always drawn, since it must have a mass. Then no site is drawn
     twice, and the sites are in the order of the run, since relative coordinates of bodies depend on the order.
@@ -505,7 +505,7 @@ def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
 def _on_few(
     cell: Cell, start: Start, sizes: Sequence[int], bonds: Sequence[tuple[int, int]]
 ) -> tuple[Floats, dict[str, Any]]:
-    """Return the state (fields, …) and the parameters of a small lattice, taken from random sites of the run."""
+    """Return the state (coordinates, …) and the parameters of a small lattice, taken from random sites of the run."""
     picked, arguments = _picked(cell, start, sizes), dict[str, Any]()
     for p in cell.parameters:
         value = np.asarray(start.parameters[p.name])

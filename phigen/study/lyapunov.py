@@ -21,7 +21,7 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: The exponents are recorded after numbers of steps that grow by this factor: eight times while the number doubles.
+#: The exponents are recorded when the number of steps has grown by this factor, eight times until the number doubles.
 _SPACING = 2 ** (1 / 8)
 
 

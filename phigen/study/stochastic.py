@@ -16,11 +16,11 @@ from phigen.symbolic.arrays import Floats
 #: PATHS: number of Wiener paths. LEVELS: number of step sizes h, h/2, h/4, …. BEYOND: number of further halvings for
 #: the reference solution. SEED: seed of the paths.
 PATHS, LEVELS, BEYOND, SEED = 48, 5, 2, 1
-#: Number of steps that are tried from one state. Their increments of the noise have the largest possible size and
-#: random signs.
+#: Number of steps that are tried from one state. In these steps, increments of the noise have the largest possible size
+#: and random signs.
 SIGNS = 8
-#: Errors up to this fraction of the state count as rounding errors of the steps and of the RK4 steps of the reference
-#: solution. Methods whose steps are exact had errors of 1e-16 to 1e-14.
+#: Errors up to this fraction of the state count as rounding errors. Methods whose steps are exact had errors of 1e-16
+#: to 1e-14.
 PATH_ROUNDING = 1e-12
 
 

@@ -35,7 +35,7 @@ STRONG_SLACK = 0.2
 #: Each correction of the modified Hamiltonian should raise the power of h with which its changes decrease. The observed
 #: power may be too small by at most this fraction of the rise due to the last correction.
 MODIFIED_SLACK = 0.6
-#: Largest accepted error of the properties of a step that are exact up to rounding: Poisson defect, reversibility and
+#: Largest accepted error in three checks of single steps: of the Poisson identity, of reversibility, and of the
 #: agreement of targets. Errors are relative to the size of the compared values.
 ONE_STEP = 1e-13
 #: Largest accepted difference between the tangent map and finite differences of a step. The errors of the finite
