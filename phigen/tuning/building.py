@@ -166,7 +166,7 @@ def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection)
 
     for name in (signal.SIGTERM, signal.SIGINT):
         signal.signal(name, leave)
-    # stderr is closed: the outcome goes through the pipe, and a terminated interpreter would print a traceback.
+    # stderr is discarded, since a terminated interpreter would print a traceback there.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     start, outcome = time.perf_counter(), Refusal("building it failed")
     try:

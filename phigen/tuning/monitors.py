@@ -6,8 +6,8 @@ t where g is small.
 Candidates are made from expressions in H that resemble distances: denominators, and arguments of roots and logarithms.
 Further candidates are made from the state and from the speed |π∇H|. If H splits into two parts, ``log`` is a candidate
 too. Runs without and with a monitor are compared over the same time, with the same order and energy error. The gain of
-a monitor is the ratio of their numbers of steps. The step size for the requested error is found by halving, and then by
-interpolation between two step sizes.
+a monitor is the number of steps without it, divided by the number of steps with it. The step size for the requested
+error is found by halving, and then by interpolation between two step sizes.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: candidates are b^(k/4) for these k,
-#: the most promising first, where b is the square of a distance. OF_SPEED: further candidates are (1 + s)^(−k/4) for
-#: these k, where s is the scaled square of the speed.
+#: MOST_BASES: largest number of expressions b in H, such as the square r² of a distance, from which candidates are
+#: made. QUARTERS: values of k, the most promising first, for the candidates (r²)^(k/4) and (1 + Σ 1/b)^(−k/4).
+#: OF_SPEED: values of k for the candidates (1 + v²/m)^(−k/4), where v is the speed |π∇H| and m the median of v².
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.

@@ -112,7 +112,7 @@ class SystemProblem(Problem):
 
     @property
     def evens_out(self) -> bool:
-        """Whether monitors may be tried: only for systems without explicit time, forces and noise."""
+        """Whether monitors may be tried: not for systems with forces, noise, or an H that depends on the time."""
         return not self.system.driven
 
     def guesses(self, current: Setting) -> list[Setting]:

@@ -19,7 +19,7 @@ CONVERGED = 0.02
 #: Largest accepted difference between the solutions by two methods, as a fraction of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
-#: Accuracy of reference solutions if no accuracy is requested, relative to the largest coordinate.
+#: Accuracy of reference solutions, relative to the largest coordinate, if the caller requests no accuracy.
 KNOWN = 1e-12
 
 
@@ -112,8 +112,8 @@ def _converged(
 ) -> tuple[Floats, float, float] | None:
     """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the states.
 
-    The step is halved repeatedly. This ends when halving changes the states little, when it changes them more than the
-    previous halving did, or at the time ``until``. The result is None if steps of all sizes fail.
+    The step is halved until the states change little, or change more than at the previous halving, or the time
+    ``until`` is reached. The result is None if steps of all sizes fail.
     """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None

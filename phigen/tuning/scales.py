@@ -14,9 +14,8 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: PIECE_SECONDS: processor time, in seconds, for which the method of the spec runs with the step of the run. The time
-#: that it reaches is the time span of the search. PIECE_STEPS: largest number of steps for this; the least number is
-#: 500.
+#: The time span of the search is the time of some steps of the run, made by the method of the spec. PIECE_SECONDS:
+#: processor time of these steps, in seconds. PIECE_STEPS: largest number of these steps; the least number is 500.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.

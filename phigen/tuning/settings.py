@@ -34,8 +34,8 @@ GAUSS_ORDERS = (4, 8, 12, 16)
 #: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
 AUTO = "auto scheme"
 
-#: Compositions that are tried for near-integrable H = A + εB, with their orders. The errors of those without a
-#: corrector differ in the powers of ε and h. The two with a corrector have the cheapest steps.
+#: Compositions that are tried for near-integrable H = A + εB, with their orders. The two ``wisdom-holman`` compositions
+#: have a corrector, and the cheapest steps. The errors of the other three differ in their powers of ε and h.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),
@@ -175,7 +175,8 @@ def charts(system: System, current: Setting) -> list[Setting]:
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
     plain_settings = [Setting(kind, 4) for kind in plain_kinds if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=inner_kind) for kind, inner_kind in _NESTED]
-    # Only one of the two sides, q or p, is tried: the method of the other side is the adjoint, with the same errors.
+    # Only the default of the option ``side``, q or p, is tried: the other side gives the adjoint method, with the same
+    # errors.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
     # Splittings and Gauss methods come first, since they are built in seconds; series of order 8 may take minutes.

@@ -25,16 +25,17 @@ from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 #: PATIENCE: multiple of this share that the run may take at most. ATTEMPTS: number of step sizes that are tried for one
 #: method.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: FINALISTS: number of best methods whose steps are confirmed and timed. BEHIND: largest cost of these methods relative
-#: to the best one. ROUNDS: number of rounds of timings.
+#: FINALISTS: number of best methods whose steps are confirmed and timed. BEHIND: largest cost of these methods, as a
+#: multiple of the least cost. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
 #: Longer runs that test methods begin only before this share of the time budget is used up. If no method has passed the
 #: test by then, further methods are tested, with one step size each, until one passes.
 CONFIRMED = 1.0
-#: Share of the time budget after which no further round of timings begins. A round takes about a tenth of the budget.
+#: Multiple of the time budget after which no further round of timings begins. A round takes about a tenth of the
+#: budget.
 TIMED = 1.1
-#: Share of the time budget after which neither monitors nor ``scheme: auto`` are tried. It is larger than 1, so that
-#: half of a budget remains for monitors even if the search has used up the whole budget.
+#: Multiple of the time budget after which neither monitors nor ``scheme: auto`` are tried. It is larger than 1, so that
+#: time remains for monitors even if the search has used up the whole budget.
 MONITORED = 1.5
 #: Costs that differ by less than this factor count as equal, and the simpler method is preferred.
 EQUAL = 1.1

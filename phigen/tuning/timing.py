@@ -12,7 +12,8 @@ from phigen.tuning.problem import CompiledMethod
 #: Least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
 #: A run is timed in parts. The first part has FEW_STEPS steps. Each further part has at least as many steps as all
-#: parts before it, and up to PART_STEPS if steps are fast. After TIMED_STEPS steps no part follows.
+#: parts before it together. A part that would take less than LEAST_SECONDS has more steps, up to PART_STEPS. No part
+#: begins after TIMED_STEPS steps.
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 

@@ -15,8 +15,8 @@ from phigen.tuning.timing import nanoseconds_per_step
 
 #: Approximate number of equidistant times at which an orbit is compared with the reference solution.
 MARKS = 256
-#: Bounds of the power of time with which errors grow. An error that grows faster than the power LINEAR shows that the
-#: motion is chaotic. Below the power STEADY, the growth counts as linear, up to oscillations.
+#: Bounds for the power p of errors that grow like t^p. If p exceeds LINEAR, the motion counts as chaotic. If p is below
+#: STEADY, the growth counts as linear, up to oscillations.
 LINEAR, STEADY = 1.8, 1.3
 
 

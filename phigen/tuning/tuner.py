@@ -19,14 +19,14 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
-#: Shares of the time budget. SEARCHING: after this share no build starts. BUILDING, SCANNING and REFERRING: largest
-#: durations of one round of builds, of the measurement of one candidate with several steps, and of the computation of a
-#: reference solution. GUESSING: a candidate whose build is expected to take longer is left out of the first round.
+#: Shares of the time budget. SEARCHING: after this share no build starts. BUILDING: largest duration of one round of
+#: builds. SCANNING: largest duration of measuring one candidate with several steps. REFERRING: largest duration of
+#: computing a reference solution. GUESSING: candidates with a longer expected build are left out of the first round.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
 #: SCANNED: share of the time budget after which no candidate is measured. COMPARED: the same for classical methods.
 SCANNED, COMPARED = 0.9, 0.85
-#: The measurement of a method ends if its cost exceeds this multiple of the least cost so far. Costs are those of
-#: reaching the accuracy. WORTH: multiple for candidates. WORTH_KNOWING: multiple for classical methods.
+#: The measurement of a method ends if reaching the accuracy costs more than a multiple of the least cost so far. WORTH:
+#: this multiple for candidates. WORTH_KNOWING: this multiple for classical methods.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods with which the result is compared, with their names in tables and their orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
