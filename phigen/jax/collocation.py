@@ -154,8 +154,8 @@ class Collocation:
     def _scale(self, x: Any) -> Any:
         """Return the sizes of the unknowns (unknowns, 1), to which errors of the unknowns are relative.
 
-        The size is |x|, or 1 if x = 0, for unknowns with the scale of the state x. It is 1 for all other unknowns, such
-        as logarithms.
+        Some unknowns are of the size of the state x: for these unknowns the size is |x|, or 1 if x = 0. For all other
+        unknowns, such as logarithms, the size is 1.
         """
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)

@@ -178,8 +178,8 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Finds the axes that `vmap` adds in front of the arguments of a run. It stores the numbers of axes without
-    `vmap`.
+    """Finds the axes that `vmap` adds in front of the arguments of a run. For this, it stores the numbers of axes
+    that arguments have without `vmap`.
     """
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
