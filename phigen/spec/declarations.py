@@ -66,7 +66,10 @@ class Declarations:
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Return the names that have values at bonds only. Each has the error (message, hint) for its use at a site."""
+        """Return the error (message, hint) for each of the ``names`` that has values at bonds only.
+
+        The error is for formulas at a site.
+        """
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
             {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
@@ -74,8 +77,9 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """Return the names of indices and sizes (i, N_i). Each has the error (message, hint) for its use in a
-        density.
+        """Return the error (message, hint) for each name of an index or a size, such as i or N_i.
+
+        The error is for formulas that must be the same at all sites.
         """
         reason = "this expression must be the same for all sites"
         hint = "to use a value for each site, declare a parameter {value: …, at: sites}"
@@ -86,10 +90,10 @@ class Declarations:
         }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """Return the record of those ``names`` that may have an index: they depend on the site.
+        """Return the ``names`` that may have an index, because their values differ from site to site.
 
-        The result is None if no name may have an index. An index is an offset on a grid or, with ``ends``, an end of a
-        bond.
+        An index is an offset on a grid, or one of the ``ends`` of a bond. The result is None if the spec is not that
+        of a lattice, or if expressions must not contain an index.
         """
         if self.lattice is None or not self.indexed:
             return None
@@ -106,8 +110,8 @@ class Declarations:
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
         """Return the names that a formula of a bond or a pair may use.
 
-        At the ends a and b, the values of a coordinate x are ``x[a]`` and ``x[b]``. If ``dated``, the time is allowed.
-        Densities of H may depend on the time, but brackets may not.
+        A bond or pair has the ends a and b, where a coordinate x has the values ``x[a]`` and ``x[b]``. If ``dated``,
+        the formula may use the time: densities of H may depend on the time, but brackets may not.
         """
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
@@ -177,8 +181,9 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """Return the time, and the definitions that depend on the time. Each has the error (message, hint) for
-        its use.
+        """Return the error (message, hint) for the time, and for each definition that depends on the time.
+
+        The error is for formulas that must not depend on the time.
         """
         hint = "the time is allowed in H, forces, noise, invariants, observables, sections, stop and exact solutions"
         refused = {
@@ -191,7 +196,7 @@ class Declarations:
     def constants(self, value_name: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
         """Return the names that a constant may use: parameters, and definitions that depend on parameters only.
 
-        Messages about other names call the constant ``value_name``. ``extra`` has further names with their expressions.
+        ``value_name`` is the name of the constant in messages. ``extra`` has further names with their expressions.
         """
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
@@ -224,8 +229,8 @@ class Declarations:
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
         """Return the declarations for a Poisson structure inside another: a block of a product, or a pull-back.
 
-        ``within`` is the path of keys to the inner structure, ``coordinates`` are its coordinates. If the inner
-        structure uses a coordinate that only the outer one has, the error is ``message``, followed by the name.
+        ``within`` is the path of keys to the inner structure, and ``coordinates`` are the coordinates of the inner
+        structure. If the inner structure uses another coordinate, the error is ``message``, followed by the name.
         """
         excluded = [c for c in self.coordinates if c not in coordinates]
         gone = {n for n, e in self.definitions.items() if any(s in excluded for s in symbols_of(e))}
@@ -398,8 +403,9 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter whose values are at sites or bonds (``domain``) if the lattice does not have these
-    elements.
+    """Report a parameter with values at sites if there is no lattice, or at bonds if the lattice has no graph.
+
+    ``domain`` is ``sites``, ``bonds`` or ``all``.
     """
     relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
@@ -412,9 +418,9 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # At first, the name of each definition stands for a symbol; when a definition has been read, its name stands for
-    # its expression. A definition is read after the definitions that it uses. So a symbol remains only in a cycle of
-    # definitions, which is an error.
+    # At first, the name of each definition stands for a symbol. When the definition has been read, its name stands for
+    # its expression. Each definition is read after the definitions that it uses. So symbols of definitions remain in
+    # expressions only after an error, such as a cycle of definitions.
     scope = declared.dated_scope()
     names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
@@ -433,8 +439,8 @@ def _in_order(
 ) -> list[str]:
     """Return the names of the definitions, sorted so that each comes after the definitions that it uses.
 
-    ``uses`` maps the name of a definition to the names in its expression; ``keys`` maps it to its key in the file. A
-    cycle is reported, and then broken at its first definition.
+    ``uses`` has the names that the expression of each definition contains. ``keys`` has the key of each definition in
+    the file. A cycle is reported; then the first definition of the cycle counts as one that uses no other.
     """
     graph = {name: [u for u in used_names if u in uses] for name, used_names in uses.items()}
     while True:

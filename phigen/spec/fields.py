@@ -148,9 +148,9 @@ _FORMS: dict[str, tuple[Kind, str]] = {
 
 
 def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
-    """Return the record of keys for a Poisson structure, which is given in exactly one form (matrix, brackets, …).
+    """Return the record of the keys for a Poisson structure. A spec has exactly one of the keys for the forms of π.
 
-    Products and pull-backs may be nested to the depth ``nested``. ``subject`` is the name of the record in messages.
+    Products and pull-backs may be nested to the depth ``nested``. Messages call the record ``subject``.
     """
     forms = [RecordKey(form, *described) for form, described in _FORMS.items()]
     if nested:
@@ -382,8 +382,8 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for words that users may write as keys of a run, although runs have no such keys. A hint says where the setting
-#: belongs, or which key a run has for it.
+#: Hints for words that are not keys of a run, but that users may write as such. A hint says where the setting belongs,
+#: or which key a run has instead.
 _BESIDE_RUNS = {
     key: f"{key}: is a key of the whole spec: write it beside runs:, not in a run"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")

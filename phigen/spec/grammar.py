@@ -123,8 +123,8 @@ _CHARACTER_HINTS = {
     ":": "expressions are formulas of numbers, names and functions, not Python",
 }
 
-#: Characters that users may write instead of operators, with the operators. After the error, the parser continues as if
-#: the operator stood there, so that later errors of the expression are reported too.
+#: Characters that users may write instead of operators, with the operators. The parser reports the character, and
+#: continues as if the operator stood there, so that later errors in the expression are reported too.
 _MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
 
 
@@ -455,9 +455,7 @@ class Parser:
         return sqrt(first) if function == "sqrt" else call(function, *arguments)
 
     def raised(self, base: Expression, exponent: Fraction, token: Token) -> Expression:
-        """Return base ** exponent. If the power is undefined or too large, report this, and return 1 without computing
-        it.
-        """
+        """Return base ** exponent. A power that is undefined or too large is reported, and the result is 1."""
         if abs(exponent) > limits.EXPONENT:
             message = f"the exponent {_brief(exponent)} is out of range"
             self.report(
@@ -480,8 +478,7 @@ class Parser:
         return self.bounded(power(base, exponent), token)
 
     def bounded(self, result: Expression, token: Token) -> Expression:
-        """Return the result of an operation. If a constant or an exponent in it is out of range, report this, and
-        return 1.
+        """Return ``result`` unchanged. If a constant or an exponent in it is out of range, report this, and return 1.
 
         Constant folding can make constants that are out of range, as in 1e30*1e30.
         """

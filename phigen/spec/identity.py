@@ -32,7 +32,7 @@ def digest(spec: Spec) -> str:
 
 
 def _plain(node: Node) -> Any:
-    """Return a YAML value as nested lists of its texts. A mapping becomes a list of pairs, which keeps its order."""
+    """Return a YAML value as a text or a nested list of texts. A mapping becomes a list of pairs [key, value]."""
     if isinstance(node, Scalar):
         return node.text
     if isinstance(node, Sequence):

@@ -1,8 +1,9 @@
 """Kinds of values in a spec. Each kind can read a node and describe itself as JSON Schema.
 
-`fields.py` builds the table of the format from kinds. The validator and the schema are both made from that table.
-Reading checks the shape only. The text of an expression stays a `Scalar` node, which is parsed later, when the declared
-names are known. A value with an error is reported and read as None, which is never a valid value.
+`fields.py` builds the table of the format from kinds. The validator and the schema are made from that table. Reading
+checks the structure of the YAML, but no expressions. The text of an expression stays a `Scalar` node, which is parsed
+later, when the declared names are known. A value with an error is reported and read as None, which is never a valid
+value.
 """
 
 # `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
@@ -58,7 +59,7 @@ def label(path: Path) -> str:
 def list_hint(node: Node) -> str:
     """Return the hint for a node that should be a list.
 
-    The hint shows how to write a list with the value of the node or, if the node is a mapping, with its names.
+    The hint shows how to write a list with the value of the node or, if the node is a mapping, with its keys.
     """
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
@@ -256,7 +257,7 @@ class ListOf(Kind):
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
             # The user has written a mapping in place of a list. After the error, the keys of the mapping are read as
-            # the list. So they are declared as names, and later uses of these names are not reported.
+            # the list. So the keys count as declared names, and later uses of the names are not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
             is_matrix = isinstance(self.item, ListOf) and isinstance(node, MappingNode)
@@ -379,12 +380,11 @@ class Record(Kind):
         return value
 
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
-        """Report an unknown key. Return the known key that was probably meant ("" if there is none), and its
-        value.
+        """Report an unknown key. Return the known key that was probably meant, and the value.
 
-        Reading the value declares the names in it and reports its errors. The value is None if it cannot be read. It is
-        None too if the unknown key is a word of another program (`MEANT`), because other programs often write values
-        differently.
+        The first result is "" if no known key resembles the unknown one. The value is read only after a probable
+        spelling error; otherwise the second result is None. For instance, it is None for words of other programs
+        (`MEANT`), because other programs often write values differently.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)

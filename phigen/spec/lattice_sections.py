@@ -69,11 +69,10 @@ def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, 
 
 
 def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
-    """Return the lattice with the kinds of its Casimirs, and with the fields ``parts``, which are read after the rest
-    of the lattice.
+    """Return the lattice with the kinds of its Casimirs, and with ``parts``: attributes of `Lattice` by name.
 
-    If the spec states no kind, a density without neighbours is a Casimir at every site, and the sum of any other
-    density over the sites is a Casimir.
+    If the spec states no kind, a density that depends on one site only is a Casimir at every site. For any other
+    density, the sum over the sites is a Casimir.
     """
     local = {name: "sum" if any("[" in s for s in symbols_of(e)) else "sites" for name, e in casimirs.items()}
     return replace(lattice, kinds={**local, **kinds}, **parts)

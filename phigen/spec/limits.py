@@ -60,9 +60,9 @@ CELLS = 8_000_000
 #: If the proof of a bi-realisation is estimated to need more products of terms than this, the bi-realisation is checked
 #: at sample points instead. At the limit, the proof takes ten seconds.
 PROOF_PRODUCTS = 20_000_000
-#: Largest seed of noise (a seed has 64 bits), and largest number of members (they are numbered with 32 bits).
+#: SEED: largest seed of noise, which has 64 bits. MEMBERS: largest number of members, whose numbers have 32 bits.
 SEED, MEMBERS = 2**64 - 1, 2**32
-#: Largest seed of a sweep. The counter-based random generator takes words of 64 bits, and their sign bit must be 0.
+#: Largest seed of a sweep. The random generator takes seeds of 64 bits, of which the sign bit must be 0.
 SWEEP_SEED = 2**63 - 1
 #: Largest number of sources of noise.
 SOURCES = 64

@@ -91,7 +91,7 @@ class MatrixForm:
 
 @dataclass(frozen=True)
 class CanonicalForm:
-    """{q_i, p_i} = 1, and all other brackets are 0. Coordinates that are in neither list are Casimirs."""
+    """{q_i, p_i} = 1, and all other brackets are 0. Coordinates that are neither in ``q`` nor in ``p`` are Casimirs."""
 
     q: tuple[str, ...]
     p: tuple[str, ...]
@@ -190,11 +190,11 @@ class SolverOptions:
 class Extras:
     """Parts of the generated code that are optional.
 
-    ``tangent`` adds ``step_tangent``, the derivative of a step. If ``modified_hamiltonian`` is not 0, a function of
-    this name is added. It computes H plus this number of correction terms. ``without`` has parts to leave out
-    (`phigen.spec.names.PARTS`). ``included`` has parts to include although the profile leaves them out. ``adjoint``
-    adds the transposed derivative of a step and of a run, with respect to state and parameters. ``real`` is the number
-    type of the C, double or float.
+    ``tangent`` adds the function ``step_tangent``, the derivative of a step. If ``modified_hamiltonian`` is n > 0, a
+    function is added that computes H plus n correction terms. ``without`` lists parts of `phigen.spec.names.PARTS` to
+    leave out. ``included`` lists parts to include although the profile leaves them out. ``adjoint`` adds the transposed
+    derivatives of a step and of a run, with respect to state and parameters. ``real`` is the number type of the C:
+    double or float.
     """
 
     tangent: bool = False
@@ -231,9 +231,9 @@ class Overrides(TypedDict, total=False):
 class AverageChoice:
     """Setting ``average:`` of a run: the time averages to compute.
 
-    ``of`` lists the observables to average; if it is empty, all are averaged. The averages are over the rows from the
-    time ``after`` on, or over all rows if it is None. These rows are divided into at least ``blocks`` blocks. The
-    statistical error follows from the means of the blocks.
+    ``of`` lists the observables to average; () stands for all observables. The averages are over the rows from the time
+    ``after`` on; None stands for all rows. The rows are divided into at least ``blocks`` blocks, and the statistical
+    error follows from the means of the blocks.
     """
 
     after: Fraction | None = None
@@ -284,9 +284,10 @@ class Run:
 
 @dataclass(frozen=True)
 class SpectrumChoice:
-    """Setting ``spectrum:`` of a run of a lattice: the power spectrum S(q, ω) of the fields ``of``.
+    """Setting ``spectrum:`` of a run of a lattice: the power spectrum S(q, ω), with wave vector q and frequency ω.
 
-    The stored states (frames) from the time ``after`` on are used; None means all frames.
+    ``of`` lists the coordinates to transform. The stored states (frames) from the time ``after`` on are used; None
+    means all frames.
     """
 
     of: tuple[str, ...]
@@ -295,9 +296,9 @@ class SpectrumChoice:
 
 @dataclass(frozen=True)
 class CorrelationChoice:
-    """Setting ``correlation:`` of a run of a lattice: the correlation of the fields ``of`` and ``other``.
+    """Setting ``correlation:`` of a run of a lattice: the correlation of two coordinates, ``of`` and ``other``.
 
-    ``axis`` is the direction, ``up_to`` the largest distance in sites. The stored states (frames) from the time
+    ``axis`` is the direction, and ``up_to`` is the largest distance in sites. The stored states (frames) from the time
     ``after`` on are used; None means all frames.
     """
 
@@ -544,9 +545,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """Order that the spec requests. If it states ``terms`` instead, the order of a symmetric method with these
-        terms.
-        """
+        """Order that the spec requests. If the spec states the number ``terms`` instead, it is rounded up to even."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(

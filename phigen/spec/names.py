@@ -73,7 +73,7 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "heisenberg": (1, lambda n: 2 * n + 1),
     "aff": (1, lambda n: 2),
 }
-#: Families of Lie algebras of which only these sizes n are available.
+#: Families of Lie algebras that are available for a few n only, with these n.
 MEMBERS = {"se": (2, 3), "aff": (1,)}
 FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
 FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
@@ -112,11 +112,11 @@ LEFT_OUT = {
 #: Directions of crossings of a section.
 DIRECTIONS = ("rising", "falling", "both")
 
-#: SWEEP_NAMES: quantities that a sweep may vary besides parameters and initial values. KEPT: quantities that it may
-#: store.
+#: SWEEP_NAMES: quantities that a sweep may vary besides parameters and initial values. KEPT: quantities that a sweep
+#: may store.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: REDUCTIONS: ways to reduce the density of an observable of a lattice to one number. ADDITIVE: those that are linear.
+#: REDUCTIONS: ways to reduce a density on a lattice to one number. ADDITIVE: the linear ones among them.
 REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
 #: Elements of a lattice over which the density of an observable may be reduced.
@@ -128,9 +128,9 @@ STATISTICS = ("mean", "std", "error")
 #: Representations of an attitude (the rotation of a rigid body) that ``reconstruct:`` may name.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of parts of H. CORRECTED: compositions with a corrector, for near-integrable systems.
-#: NEAR_INTEGRABLE: all compositions for near-integrable systems. FLOW_COMPOSITIONS: NEAR_INTEGRABLE, and compositions
-#: for splittings into two parts. COMPOSITIONS: all compositions.
+#: CORRECTED: Wisdom–Holman compositions; all except the first have a corrector. NEAR_INTEGRABLE: all compositions for
+#: near-integrable systems. FLOW_COMPOSITIONS: all compositions that need a splitting of H into two parts.
+#: COMPOSITIONS: all compositions.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),

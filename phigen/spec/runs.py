@@ -186,7 +186,7 @@ def _average(
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
     """Report an average that begins after the end of a run.
 
-    The steps must be equal in physical time. With a monitor they are not, and the end is not known in advance.
+    Call this function only without a monitor. With a monitor, the time of the end is not known in advance.
     """
     start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
@@ -199,10 +199,9 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """Return the expression under a key of a run, ``section`` or ``stop``. The run finds the zeros of this
-    expression.
+    """Return the expression under ``key``, which is ``section`` or ``stop``; report one that is constant.
 
-    An expression that is constant along every run is reported.
+    During the run, phigen finds zeros of the expression. ``scope`` has the names that the expression may use.
     """
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}

@@ -17,10 +17,10 @@ from phigen.symbolic.expression import Expression
 
 
 def stop_of(spec: Spec, run: str, text: str, place: str) -> Expression | None:
-    """Return the expression in a text from the command line, with the names that ``stop:`` of the run allows.
+    """Return the expression in a text from the command line. It may use the names that ``stop:`` of a run may use.
 
-    Raises `SpecError` with the messages that ``stop:`` in a spec would have. The messages give columns of the text, and
-    ``place`` as the name of the file.
+    Raises `SpecError` with the messages that ``stop:`` in a spec would have. In the messages, columns are those of the
+    text, and ``place`` stands for the name of the file.
     """
     of_spec = Reader(Problems(spec.file, spec.source))
     declared = declare(SPEC.read(read(spec.source, of_spec.problems), (), of_spec) or {}, of_spec)

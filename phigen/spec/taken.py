@@ -1,8 +1,8 @@
 """Names that a spec must not have.
 
 The name of a spec is that of the generated files NAME.h and NAME.py, and the prefix of generated symbols, such as
-NAME_init. So NAME must not be the name of a header or module that other code needs, since the generated file would hide
-it on a search path. The symbols must not clash with those of libraries or of other specs.
+NAME_init. If other code needs a header or module called NAME, the generated file would hide that header or module on a
+search path. The generated symbols must not clash with symbols of libraries or of other specs.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 # linked with the generated code would call the generated functions instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: Last words of refused names of specs, with the symbol that would clash. For example, a spec NAME generates the symbol
-#: NAME_default_params for its default parameters. A spec NAME_default would generate the same symbol for the type of
-#: its parameters.
+#: A spec must not have a name that ends in one of these words. Each word has the ending of the symbol that would clash.
+#: For example, a spec NAME generates the symbol NAME_default_params for its default parameters. A spec NAME_default
+#: would generate the same symbol for the type of its parameters.
 CLASHING_ENDS = {
     "default": "default_params",
     "modified": "modified_hamiltonian",

@@ -144,8 +144,8 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     }
 
 
-#: Keys of the Hamilton–Jacobi series. Schemes without a series refuse these keys, except with the values that are
-#: listed here: they request nothing.
+#: Keys of the Hamilton–Jacobi series, each with the values that request nothing. Schemes without a series refuse all
+#: other values of these keys.
 SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
 #: Schemes that do not use the Hamilton–Jacobi series. For messages, each has a sentence on what the scheme uses
 #: instead.
@@ -155,7 +155,7 @@ WITHOUT_SERIES = {
 }
 
 
-#: Keys that lattices refuse, except with the values that are listed here: they request nothing. Each key has a hint.
+#: Keys that are refused for lattices. Each key has the values that are allowed nevertheless, and a hint.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "remove terms; on lattices, order: determines the method"),
@@ -164,7 +164,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 }
 
 
-#: Keys that are refused with noise, except with the values that are listed here. Each key has the reason and a hint.
+#: Keys that are refused with noise. Each key has the values that are allowed nevertheless, the reason, and a hint.
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
@@ -233,9 +233,9 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
 
 
 def _no_brackets(declared: Declarations) -> MatrixForm:
-    """Return the zero matrix as π of a site.
+    """Return the zero matrix.
 
-    This is π of a site if all brackets of a lattice are along bonds. It also replaces a π with errors.
+    The zero matrix is π of a site if all brackets of a lattice are along bonds. It also replaces a π with errors.
     """
     n = len(declared.coordinates)
     return MatrixForm(((ZERO,) * n,) * n)
@@ -403,10 +403,10 @@ def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationC
 def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
-    """Return the expressions in lists of a bi-realisation, such as ``alpha``, by the key of the list.
+    """Return the expressions in the ``lists`` of a bi-realisation, such as the list under ``alpha``, by key.
 
-    Each list has an expression for each coordinate. The expressions may use the coordinates and the momenta ``p_NAME``.
-    ``where`` names the bi-realisation in messages.
+    Each list has one expression for each coordinate. The expressions may use the coordinates and the momenta
+    ``p_NAME``. ``where`` is the name of the bi-realisation in messages.
     """
     n, scope, expressions = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
     for key, nodes in lists.items():

@@ -41,9 +41,7 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """Return the place in the file of the character ``index`` of the text. If it is unknown, return the place of
-        the scalar.
-        """
+        """Return the place of the character ``index`` of the text in the file; if unknown, the place of the scalar."""
         here = self.location
         if self.offset is not None:
             return Location(here.line, here.column + self.offset + index, here.file)
