@@ -16,7 +16,7 @@ from phigen.spec.names import PROFILES, SCHEMES
 
 #: Suffixes of figures.
 FIGURES = (".png", ".svg", ".pdf")
-#: Suffixes of films, which only lattices have.
+#: Suffixes of films. Only runs of lattices can be drawn as films.
 FILMS = (".gif", ".mp4")
 
 #: The orders that ``--order`` accepts.
@@ -30,7 +30,7 @@ order_option = click.option("--order", metavar="K", type=ORDER, help="Order of t
 #: The seeds that ``--seed`` accepts. A seed selects the random numbers of a run with noise.
 SEED = click.IntRange(0, limits.SEED)
 
-#: The option for the target whose solver is run. The value auto stands for C, or for NumPy if there is no C compiler.
+#: The option for the target of the solver. The value auto stands for C, or for NumPy if there is no C compiler.
 target_option = click.option(
     "-t",
     "--target",

@@ -20,8 +20,7 @@ LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return the planned changes of files for each system. Changes for the bindings of the system, and for the C files
-    that the bindings use, are added.
+    """Return the ``planned`` changes with further changes: the bindings of each system, and the C that they call.
 
     Raises `SpecError` with a list of the systems for which bindings cannot be generated.
     """

@@ -13,13 +13,13 @@ def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]
     """Return the files for build systems (name → text).
 
     ``solvers`` maps the name of each solver in the folder to its files. The file for a build system lists those files
-    of the solvers that have the suffix in `FILES`. There may be no such files.
+    of the solvers that have the suffix in `FILES`.
     """
     return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
 
 
 def sources_lack(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> list[str]:
-    """Return the build systems whose file would list no sources."""
+    """Return those of the build ``systems`` for which no solver has a source file."""
     endings = {Path(file).suffix for files in solvers.values() for file in files}
     return [system for system in sorted(systems) if FILES[system][1] not in endings]
 

@@ -148,8 +148,7 @@ def command(
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
     """Return the interval of each coordinate.
 
-    The interval is the one in ``--box`` or, if this option does not name the coordinate, the one in ``box:`` of the
-    run. The default is an interval around the initial value.
+    ``--box`` takes precedence over ``box:`` of the run. The default is an interval around the initial value.
     """
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
@@ -168,8 +167,8 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
     """Return the interval of times for which the bound holds.
 
-    The interval is the one in ``--time``, by default from the start to the end of the run. If H does not depend on the
-    time, the interval consists of the start of the run alone.
+    ``times`` is the text of ``--time``. By default the interval extends from the start to the end of the run. If H does
+    not depend on the time, the interval contains only the start of the run.
     """
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")

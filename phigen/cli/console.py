@@ -174,9 +174,7 @@ def out_document(text: str) -> None:
 
 @contextmanager
 def _stdout() -> Iterator[None]:
-    """Context in which an error of writing has stdout as the name of the file. A `BrokenPipeError` is raised
-    unchanged.
-    """
+    """Context in which an `OSError` gets the file name "stdout", except a `BrokenPipeError`, which is unchanged."""
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
     try:

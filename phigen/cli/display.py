@@ -48,9 +48,7 @@ class Display:
 
     @contextmanager
     def room(self) -> Iterator[None]:
-        """Context in which the status line is not drawn. It is cleared first, so that a message can be written in its
-        place.
-        """
+        """Clear the status line, and return a context in which it is not drawn, so that messages can be written."""
         with self._lock:
             if self._visible:
                 sys.stderr.write("\r\x1b[K")

@@ -1,4 +1,4 @@
-"""The end of a run and the times of its stored states, as keys of the run or options of the command define them."""
+"""The end of a run, and the times of its stored states, from keys of the run or options of the command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.runtime.solver import Solver
 #: Largest number of states that ``--every`` may store: the list of 10⁷ times alone takes 0.3 GB.
 _MOST_TIMES = 10_000_000
 
-#: An experiment of an ordinary system or of a lattice.
+#: The class of an experiment: `Experiment`, or the class for lattices, which is derived from `Experiment`.
 E = TypeVar("E", bound=Experiment)
 AnySolver = Solver | LatticeSolver
 
@@ -91,8 +91,8 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
 def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequence[str] = ()) -> E:
     """Return the experiment with the times at which states are stored.
 
-    These times have the distance ``every``, or they are listed in ``at``. Each entry of ``at`` is a text with times, or
-    the path of a file with times. Without these arguments, the keys of the run apply.
+    ``every`` is the distance between the times. Alternatively, ``at`` lists the times: each entry is a text with times,
+    or the path of a file with times. Without ``every`` and ``at``, the keys of the run apply.
     """
     if every is None and not at and experiment.run.every is not None:
         every = float(experiment.run.every)

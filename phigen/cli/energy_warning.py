@@ -30,11 +30,11 @@ _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the st
 
 
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
-    """Return the warning about the energy error of a run of an ordinary system; "" if no warning is necessary.
+    """Return the warning about the energy error of a run without a lattice; "" if no warning is necessary.
 
-    If forces act or H depends on the time, the error is that of the energy balance: H minus the work done. The work is
-    an integral, whose error is estimated. If this estimate is not small compared with the energy error, or is large
-    itself, there is no warning.
+    If forces act or H depends on the time, the energy error is the change of H minus the work done. The work is an
+    integral, whose error is estimated. There is no warning if this estimate is larger than half the energy error, or
+    exceeds the limit for energy errors.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < min(energy.error / 2, LARGE_ENERGY_ERROR)
@@ -47,7 +47,7 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
 
 
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
-    """Return the warning about an energy error, with a smaller step as a hint; "" if the error is not large."""
+    """Return the warning about an energy error, with a hint; "" if the error is finite and not large."""
     if not math.isfinite(error):
         warning = "H is not a finite number on all of this run: do not trust these states"
         return f"{warning}\n  hint: the run begins where H is not defined, or reaches such a point"

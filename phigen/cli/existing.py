@@ -19,8 +19,8 @@ def _keep(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     ctx.meta[_FORCE] = value
 
 
-#: The option ``--force``. click reads it before the options that name files. So the checks of these files know whether
-#: it was given.
+#: The option ``--force``. click reads this option before those that name files. So the checks of files know whether
+#: ``--force`` was given.
 force_option = click.option(
     "--force",
     is_flag=True,

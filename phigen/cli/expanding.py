@@ -1,4 +1,4 @@
-"""Options ``--expand`` and ``--lattice`` of ``phigen show``: a small lattice as an ordinary spec, and the reverse."""
+"""Options ``--expand`` and ``--lattice`` of ``phigen show``: a small lattice as a spec without lattice, and back."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OPTION = "--expand"
 
 
 def expanded_text(spec: Spec, sizes: str) -> str:
-    """Return the text of the ordinary spec into which a lattice expands.
+    """Return the text of a spec without lattice, which describes a small lattice site by site.
 
     ``sizes`` are sizes such as ``3x3``, or the name of a run with the sizes.
     """
@@ -43,7 +43,7 @@ def expanded_text(spec: Spec, sizes: str) -> str:
 
 
 def lattice_text(spec: Spec) -> str:
-    """Return the text of a lattice spec, from an ordinary spec that writes out identical sites one by one."""
+    """Return the text of a lattice spec, from a spec that describes identical sites one by one."""
     from phigen.lattice.recognition import MIN_SITES_PER_AXIS, recognised_lattice
     from phigen.spec.yaml_text import spec_text
 

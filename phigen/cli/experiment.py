@@ -30,9 +30,9 @@ class Experiment:
     """Run of a spec, changed by options of the command line.
 
     ``end`` is set if the run ends at a given time or at a zero of an expression; then the last step may be shorter than
-    the others. ``times`` are the times of stored states, which replace the stride. The first and the last state are
-    stored too. ``past`` has the rows of a finished run that this run continues (`phigen.cli.past.StoredRows`).
-    ``first`` is the attitude at the start; None stands for the identity.
+    the others. If ``times`` is not None, states are stored at these times, at the start and at the end; the stride of
+    the run is ignored. If the run continues a finished run, ``past`` has the rows of the finished run
+    (`phigen.cli.past.StoredRows`). ``first`` is the attitude at the start; None stands for the identity.
     """
 
     run: Run
@@ -110,7 +110,7 @@ class Experiment:
 
 
 def expect_system(spec: Spec) -> None:
-    """Raise `SpecError` for lattices. The hint says how to expand a lattice to an ordinary spec."""
+    """Raise `SpecError` for lattices, with a hint that `phigen show --expand` makes a spec without lattice."""
     if spec.lattice:
         from phigen.geometry.system import system_of_lattice
 

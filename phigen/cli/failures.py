@@ -23,7 +23,7 @@ USAGE = 2
 
 
 class SeveralError(PhigenError):
-    """Errors of several specs in one command; the exit code is the smallest of their codes."""
+    """Errors of several specs in one command. The exit code of the command is the smallest exit code of the errors."""
 
     def __init__(self, errors: Sequence[PhigenError]) -> None:
         super().__init__(f"{len(errors)} errors")

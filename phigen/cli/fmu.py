@@ -29,8 +29,8 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
     """
     from phigen.fmu.archive import unit_of
 
-    # --stack measures the stack of the C alone. An FMU also contains the functions of FMI, so it does not state this
-    # size.
+    # --stack measures the stack that the generated C needs. The functions of FMI may need more, so FMUs do not state
+    # the size of the stack.
     collector, units, of_c = Collector(), {}, replace(options, single_file=False, stack=None)
     for compilation in compilations:
         with collector.collecting():

@@ -130,8 +130,8 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
-    # With a monitor, steps are not equal in t, so times do not determine the number of steps. Then the number in the
-    # file is used. It is 0 for a .csv.
+    # With a monitor, steps are not equal in t, so the times do not determine the number of steps. A .npz file contains
+    # the number. For a .csv file, the number is 0.
     steps = earlier_run.steps if solver.interface.monitored else steps
     return replace(experiment, past=replace(earlier_run, steps=steps))
 

@@ -53,9 +53,9 @@ class Change:
 
 
 def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable[str]) -> list[Change]:
-    """Return the changes that building NAME makes in its folder: files to write, and obsolete files to remove.
+    """Return the changes by a build of the system ``name`` in its ``folder``: files to write, and obsolete files.
 
-    Only files of the ``targets`` are removed.
+    Obsolete files are removed, but only those of the ``targets``.
     """
     _expect_own_folder(folder)
     result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]

@@ -83,8 +83,9 @@ def past_of(path: Path, names: Interface, option: str) -> StoredRows:
 
 
 def _expect_rows(stored_rows: StoredRows, needed_columns: Sequence[str]) -> None:
-    """Raise `ValueError` for rows that do not come from a run, and `KeyError` if one of ``needed_columns`` is
-    absent.
+    """Raise `ValueError` for rows from which no run can be continued, and `KeyError` for a missing column.
+
+    A run can be continued only if the values of ``needed_columns`` in the last row are finite.
     """
     if (
         stored_rows.rows.dtype != np.float64
@@ -137,9 +138,8 @@ def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Ex
 def begun(solver: Solver, experiment: Experiment) -> Session:
     """Return a session of the solver, at the state from which the steps of an experiment start.
 
-    If the experiment continues a finished run, this is the last state of that run. The values that were fixed at the
-    start of that run stay the same: the gauge (the multiples of Casimirs that are subtracted from H) or, with a
-    monitor, the energy level e = −H.
+    If the experiment continues a finished run, the session starts at the last state of the finished run. It also has
+    the gauge of the finished run or, with a monitor, the energy level of the finished run.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

@@ -109,7 +109,7 @@ class Recorder:
         }
         self.session: Session
         self.number = 0.0  # number of steps up to the last row, not an integer if this row lies inside a step
-        self._whole: int | None = None  # number of whole steps, set when the partial last step has been made
+        self._whole: int | None = None  # number of whole steps; None until the partial last step has been made
         self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
 
@@ -233,7 +233,7 @@ class Recorder:
     def _is_appended(self, path: Path) -> bool:
         """Whether new rows are appended to the file of the finished run.
 
-        This holds for ``.csv``; a ``.npz`` is written again when the run is complete.
+        Rows are appended to a ``.csv`` file. A ``.npz`` file is written again when the run is complete.
         """
         return path.suffix.lower() == ".csv"
 

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
 
-#: The viewer of the page can show the beginning of a run without gaps. For this, the state after each step is stored,
-#: up to this number of steps.
+#: The page has the state after each of the first steps of a run, up to this number of steps. So the viewer of the page
+#: can show the beginning of the run without gaps.
 _OPENING = 4_000
 
 
@@ -119,10 +119,9 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Return trajectories of the first steps by the solver and by other methods, with the state after every
-    step.
+    """Return trajectories over the first steps, with a row for every step: those of the solver and of other methods.
 
-    The result is empty if the trajectory of the whole run already has the state after every step.
+    The result is empty if the trajectory of the whole run already has a row for every step.
     """
     from phigen.cli.recording import Files, Recorder, compared
 

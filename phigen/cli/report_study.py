@@ -57,8 +57,8 @@ def studied(
 def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
     """Return the closed form of the solution, as a function of the time since the start of the run.
 
-    The result is None if the spec does not state the closed form of every coordinate. It is None also if there is a
-    monitor, because then steps are not equal in t.
+    The result is None if the spec does not state the closed form of every coordinate, or if there is a monitor. With a
+    monitor, steps are not equal in t.
     """
     import numpy as np
 
@@ -76,10 +76,10 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """Return a function that maps a state to the largest change of a Casimir from its value at x0.
+    """Return a function that maps a state to the largest relative change of a Casimir from its value at x0.
 
-    The change of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for this Casimir.
-    For systems without Casimirs the result is None.
+    The changes are relative to the sizes that `phigen.geometry.conservation.units` returns. For systems without
+    Casimirs the result is None.
     """
     from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING

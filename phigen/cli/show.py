@@ -238,7 +238,7 @@ def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str,
 
 
 def _modified(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return the modified Hamiltonian H̃ as a sum, and its first corrections, as pairs of name and text."""
+    """Return a sum of powers of h times H_j for the modified Hamiltonian H̃, and the first H_j, as (name, text)."""
     from phigen.notation.generating import modified_formulas
 
     corrections = modified_formulas(compilation, count, max_terms)

@@ -18,7 +18,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 def load_one(source: str) -> Spec:
-    """Return the spec in a file, or the bundled spec of that name if there is no such file."""
+    """Return the spec in the file ``source``. If this file does not exist, return the bundled spec of that name."""
     from phigen import spec
 
     path = spec_path(source)

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 #: Further accuracies for which results are shown, as multiples of the requested accuracy.
 _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
-#: If the error of the cheapest setting is smaller than the accuracy by more than this factor, the accuracy did not
-#: limit the step. Then a remark says that larger steps fail.
+#: If the error of the cheapest setting is smaller than the requested accuracy by more than this factor, larger steps
+#: would be accurate enough, but fail for another reason. Then a remark says that larger steps fail.
 _UNDECIDED_FACTOR = 20
 #: _MOST_MONITORS: largest number of monitors in the table. _LEAST_GAIN: a monitor is proposed only if it reduces the
 #: number of steps by this factor, since each step with a monitor costs more. _FORMULA_LENGTH: number of characters to
 #: which formulas in the table are cut.
 _MOST_MONITORS, _LEAST_GAIN, _FORMULA_LENGTH = 5, 2.0, 60
-#: Number of states that the proposed run of an ordinary system stores, enough for a figure.
+#: Number of states that the proposed run stores, enough for a figure. Runs of lattices may store fewer states.
 _STORED_STATES = 1000
 
 
@@ -122,18 +122,14 @@ def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
 
 
 def gauge_of(curve: Curve) -> str:
-    """Return the gauge of a method in the words of the spec: how the multiples of Casimirs to subtract from H are
-    chosen.
-
-    Returns "none" for methods without a gauge, and "" for classical methods.
-    """
+    """Return the gauge of a method as a spec would state it: "none" without a gauge, and "" for classical methods."""
     if curve.setting is None:
         return ""
     return curve.setting.gauge if curve.gauged else "none"
 
 
 def scheme_of(curve: Curve) -> str:
-    """Return the name of the construction by which the method reaches its order, such as a composition."""
+    """Return how a method reaches its order, as words for the table, such as "direct" or the name of a composition."""
     if curve.setting is None:
         return "explicit"
     composition = curve.composition or curve.setting.composition

@@ -161,9 +161,10 @@ def _from_specs(
     checking: bool,
     collector: Collector,
 ) -> list[VendorRequest]:
-    """Return requests for the specs that the command line names. The options are those of the command line.
+    """Return requests for the specs that the command line names.
 
-    A check without options uses the options of each solver in the manifest.
+    The options are those of the command line. But if the command is a check without options, each solver has the
+    options that the manifest states for it.
     """
     orders = []
     for spec in load_all(spec_files, collector) if spec_files else []:
