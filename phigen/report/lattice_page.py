@@ -31,7 +31,7 @@ class LatticeMaterial:
     """Content of the page of a lattice. Without a run, trajectory and verification are None.
 
     ``errors`` maps the names of conserved quantities to their errors (frames,). ``energies`` (frames, *sizes) are the
-    energies of the sites. ``failure`` is the reason if the run is incomplete. ``live`` is the live panel, ``spectrum``
+    energies of the sites. ``failure`` is the reason if the run is incomplete. ``live`` is the live panel. ``spectrum``
     contains Lyapunov exponents.
     """
 

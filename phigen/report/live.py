@@ -233,7 +233,7 @@ def quantity(
 ) -> dict[str, object]:
     """Return a conserved quantity as data for the page.
 
-    The indices ``casimirs`` or ``invariants`` select the quantity; without them it is the energy.
+    The quantity is the energy, unless indices of ``casimirs`` or of ``invariants`` select another quantity.
     """
     return {"name": name, "casimirs": casimirs, "invariants": invariants}
 

@@ -35,9 +35,9 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: The panel offers the sizes of the run, halved and doubled several times, within these limits. FEWEST: least number of
-#: sites along an axis. MOST_PAIRS, MOST_IN_CHAIN and MOST_SITES: largest numbers of sites in systems of pairs, in
-#: chains and in other lattices.
+#: Limits for the sizes that the panel offers: those of the run, halved and doubled several times. FEWEST: smallest
+#: number of sites along an axis. MOST_PAIRS, MOST_IN_CHAIN and MOST_SITES: largest numbers of sites in systems of
+#: pairs, in chains and in other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 #: Largest total number of values in the lists that a page contains: initial values, parameters and bonds.
 MOST_NUMBERS = 20_000
@@ -192,8 +192,8 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
     """Return the sizes that the panel offers, in ascending order.
 
-    There is no choice for a run with a graph, or with a list or a file for an initial value or a parameter. Then the
-    panel offers only the sizes of the run.
+    The panel offers only the sizes of the run if the lattice is a graph, or if a list or a file defines initial values
+    or parameters.
     """
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))

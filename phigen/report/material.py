@@ -1,4 +1,4 @@
-"""Content of a page; `phigen.cli.report_material` collects it, which takes most of the time of `phigen report`."""
+"""Content of the page of a system without a lattice. `phigen.cli.report_material` collects the content."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ Cell = tuple[str, str]
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: Scripts of the live panel: CURVES for ordinary systems, FIELDS for lattices. They stand after the JavaScript of the
-#: solvers.
+#: Scripts of the live panel: FIELDS for lattices, CURVES for other systems. On the page, the scripts stand after the
+#: JavaScript of the solvers.
 CURVES = ("race.js", "start.js", "curves.js", "live.js")
 FIELDS = ("race.js", "start.js", "fields.js", "live.js")
 
@@ -149,7 +149,7 @@ def _minified(script: str) -> str:
 
 
 def _complete(template: str, scripts: Sequence[str], **values: object) -> str:
-    """Return a page with its style sheet, its scripts, and the Content-Security-Policy that allows only these."""
+    """Return a page with its style sheet, its scripts, and a Content-Security-Policy that forbids further scripts."""
     css, code = "\n".join(map(_asset, _STYLES)), "\n".join(scripts)
     return _environment().get_template(f"{template}.html.jinja").render(
         policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(code)}; "

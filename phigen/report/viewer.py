@@ -17,8 +17,8 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: MOST_NUMBERS: largest number of values in all curves together. MOST_ROWS: largest number of rows of a curve. STEPS:
-#: coordinates are stored as integers from 0 to this number.
+#: MOST_NUMBERS: largest number of values in all curves together. MOST_ROWS: largest number of rows of a curve. The page
+#: contains coordinates as integers from 0 to STEPS.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
 #: Largest number of curves in the viewer.
 CURVES = 2
@@ -31,9 +31,9 @@ def viewer(
 ) -> Markup:
     """Return the viewer of the first two trajectories; empty if no curve can be drawn.
 
-    If the rows of the whole run are too far apart to be joined by lines, the viewer shows ``opening`` instead: the
-    first steps of the same methods. The level set of a Casimir is drawn too, if it is a surface or a curve in the axes
-    that are shown at first.
+    If the rows of ``methods`` are too far apart to be joined by lines, the viewer shows the trajectories in ``opening``
+    instead, which cover only the first steps. If a Casimir depends only on the coordinates that are shown at first, the
+    viewer also shows the level set of this Casimir.
     """
     first = next(iter(methods.values()), None)
     if first is None:
@@ -69,8 +69,7 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Return lines that show the symplectic leaf: the surface on which a Casimir has the same value as on the
-    trajectory. Return None if no surface can be drawn.
+    """Return lines on the surface where a Casimir has its value on the trajectory; None if no surface can be drawn.
 
     The result (points, 3) has the coordinates on the three ``axes``. Rows of NaN separate the lines.
     """
@@ -122,8 +121,8 @@ def _finite(trajectory: Trajectory) -> Any:
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
     """Return the indices of the three columns that are shown at first.
 
-    These are coordinates of the largest group. If this group has fewer than three, other coordinates or the time are
-    added.
+    They are coordinates of the largest of the `groups`. If that group has fewer than three coordinates, other
+    coordinates or the time are added.
     """
     group = max(groups(coordinates), key=len)
     columns = [coordinates.index(c) for c in group][:3]
