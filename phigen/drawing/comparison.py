@@ -16,7 +16,7 @@ _MARKERS = "osD^vXP*"
 
 @styled
 def figure(comparison: Comparison, title: str) -> Figure:
-    """Return a figure with energy errors on the left. If orbit errors are known, they are on the right.
+    """Return a figure with energy errors on the left, and with orbit errors on the right if they are known.
 
     Methods whose steps are Poisson maps have filled points.
     """

@@ -126,7 +126,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
 
 
 def _set_ticks(axes: Any, lowest: int, highest: int, zero: float | None) -> None:
-    """Set at most six ticks at powers of ten, and a tick 0 at the position ``zero`` unless this is None."""
+    """Set at most six ticks at powers of ten. Unless ``zero`` is None, set a further tick "0" at this position."""
     powers = range(highest, lowest - 1, -max(1, math.ceil((highest - lowest) / 5)))
     positions, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
     axes.set_yticks([*positions, zero] if zero else positions, [*labels, "0"] if zero else labels)

@@ -14,7 +14,7 @@ from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
 
-#: Largest number of images of a film, images per second, and dots per inch.
+#: MOST_PICTURES: largest number of images of a film. RATE: images per second. DOTS: dots per inch.
 MOST_PICTURES, RATE, DOTS = 400, 20, 80
 
 
@@ -88,9 +88,9 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
 
 
 def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
-    """Draw the first frame of a coordinate of a chain or plane. Return a function that draws another frame instead.
+    """Draw a coordinate on a chain or plane in its first frame. Return a function that draws another frame instead.
 
-    ``values`` (frames, *sizes) has all frames.
+    ``values`` (frames, *sizes) has the values of the coordinate in all frames.
     """
     first = _flat(values[0])
     axes.set_title(name)

@@ -11,11 +11,11 @@ Group = tuple[str, ...]
 def groups(coordinates: Sequence[str]) -> list[Group]:
     """Return the coordinates in groups of up to three, in order. A group of one coordinate is drawn over time.
 
-    Up to three coordinates are one group. If there are more, each position is paired with its momentum, by names such
-    as q and p, q1 and p1, x and px. If all coordinates belong to pairs, each pair is a group. But if there are exactly
-    two pairs, the two positions form one group, which shows the orbit in a plane, and the two momenta form the other
-    group. If some coordinates belong to no pair, successive names form a group if they have the same letters, or if
-    they have the same number. Long groups are split.
+    Up to three coordinates are one group. More coordinates are first paired by their names: a position with its
+    momentum, such as q with p, q1 with p1, or x with px. If all coordinates are paired, the groups are the pairs; but
+    two pairs are regrouped as the two positions, which show the orbit in a plane, and the two momenta. If a coordinate
+    remains unpaired, successive names with the same letters, or with the same number, form a group. Long groups are
+    split.
     """
     names = tuple(coordinates)
     if len(names) <= 3:

@@ -102,7 +102,7 @@ def lattice_figure(
 
 @styled
 def series_figure(run: LatticeSeries, title: str) -> Figure:
-    """Return a figure of the quantities that a run has recorded over time. Such a run records no states."""
+    """Return a figure of a run that stores numbers but no states, with a curve over time for each number."""
     from matplotlib.figure import Figure
 
     names = [*run.columns][: 2 * MOST_PANELS]
@@ -195,7 +195,7 @@ def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
 
 
 def places_of(run: LatticeTrajectory) -> Floats | None:
-    """Return positions of the sites of a graph (sites, 2); None for grids and for graphs that are too large."""
+    """Return positions (sites, 2) at which the sites of a graph are drawn; None for grids and for large graphs."""
     if "bonds" not in run.parameters or run.x.shape[2] > MOST_DRAWN:
         return None
     return placed(run.parameters["bonds"], run.x.shape[2])

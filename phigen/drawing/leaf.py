@@ -44,10 +44,9 @@ def leaf_of(
     start: Mapping[str, float],
     parameters: Mapping[str, float],
 ) -> Leaf | None:
-    """Return the leaf through the point ``start``.
+    """Return the leaf through the point ``start``; None if there is no leaf, or if ``names`` are not three coordinates.
 
-    The leaf belongs to the first Casimir that depends on no coordinates except ``names``. Returns None if there is no
-    such Casimir, or if there are not three names.
+    The leaf is that of the first Casimir that depends on no coordinates except ``names``.
     """
     for casimir in casimirs.values():
         used_names = set(symbols_of(casimir)) & set(start)
@@ -94,16 +93,16 @@ def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Fl
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
     grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, level, axis=-1)
     values, _ = leaf.value_and_gradient(grid)
-    # Where C is undefined, the grid is masked, and no lines are drawn.
+    # Where the Casimir is undefined, the grid is masked, and no lines are drawn.
     lines = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
     return [np.insert(np.asarray(line, dtype=np.float64), axis, level, axis=-1) for line in lines]
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
-    """Return the line (points, 3), moved onto the surface C = level by Newton steps.
+    """Return the line (points, 3), moved onto the leaf by Newton steps.
 
     The points stay in the plane of the line, which is perpendicular to ``axis``. Points at which Newton's method fails,
-    for instance at a pole of C, are left out. There the line is cut, so the result may be several lines.
+    for instance at a pole of the Casimir, are left out. There the line is cut, so the result may be several lines.
     """
     points = line.copy()
     with np.errstate(all="ignore"):

@@ -1,6 +1,7 @@
 """Ticks and axis names of three-dimensional plots.
 
-matplotlib only estimates the room for ticks and names. This module places them by the measured sizes of their texts.
+matplotlib only estimates the room for ticks and names. This module measures the drawn texts, and places the names so
+that they do not overlap other texts.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ CORNER = 0.08
 #: LETTERS: number of characters of a tick label that fit beside the vertical axis. WIDTH: width of each further
 #: character in points.
 LETTERS, WIDTH = 4, 2.2
-#: PAD: distance in points of one move of a name. MOST_MOVES: largest number of moves of a name. GAP: least distance
-#: between texts in pixels.
+#: Names that overlap other texts are moved several times. PAD: distance of one move, in points. MOST_MOVES: largest
+#: number of moves of a name. GAP: smallest distance between two texts, in pixels.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

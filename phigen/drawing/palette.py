@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: Colours by their roles. SVG files contain the colours literally, and a page replaces each by a variable of its style
-#: sheet; therefore no two colours are equal. The colours of curves (``series-1``, …) have a contrast of at least 3 to
-#: white and to black. Readers with every kind of colour vision can distinguish them (Okabe and Ito, with the light
-#: colours darkened).
+#: Colours by their roles. SVG files contain the colours literally. A page replaces each colour by a variable of its
+#: style sheet; therefore no two colours are equal. The colours of curves (``series-1``, …) have a contrast of at least
+#: 3 to white and to black. Readers with any kind of colour vision can distinguish these colours, which are those of
+#: Okabe and Ito, with the light ones darkened.
 PALETTE: Mapping[str, str] = {
     "paper": "#ffffff",
     "ink": "#24292f",

@@ -89,7 +89,7 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
     """Draw a curve (rows, 3) with a dot at its first point, and the net of its leaf.
 
-    The net is paler towards the back. So is the curve, unless it is long.
+    The net is paler towards the back. The curve is paler towards the back too, unless it is long.
     """
     box = around(leaf, box_of(points)) if leaf else box_of(points)
     # All axes have the same scale, unless a coordinate would become too flat.
@@ -107,8 +107,7 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
         if lines:
             _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
-    # A long curve has one shade. Otherwise the shades would change where a chord happens to end, and this would be
-    # visible.
+    # A long curve has one shade. With several shades, the points at which the shade changes would be visible.
     alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
     _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
@@ -171,7 +170,7 @@ def _draw_curve(
 
 
 def _width(points: Floats) -> float:
-    """Return the width in points with which a line is drawn; longer lines are thinner."""
+    """Return the line width of a curve, in units of 1/72 inch. Longer curves have thinner lines."""
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
@@ -207,8 +206,8 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 def box_of(points: Floats) -> Floats:
     """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
 
-    The bounds are widened in directions in which the points extend little. They are not widened if the values in a
-    direction are so small that its axis has a scale of its own.
+    If the points extend much less along one axis than along the others, the box is widened along this axis. An axis
+    with values below 1/100 of the largest value is widened less.
     """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low

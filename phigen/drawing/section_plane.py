@@ -20,7 +20,8 @@ _CONSTANT = 1e-8
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
-    If a coordinate and its momentum both vary, the first such pair is drawn.
+    The columns belong to the first of the `phase_planes` in which two coordinates vary, such as a position and its
+    momentum. If there is no such plane, the first two varying columns are drawn. Constant columns are drawn last.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)

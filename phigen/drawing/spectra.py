@@ -1,4 +1,4 @@
-"""Plots of dynamic structure factors and correlations."""
+"""Plots of correlations, and of dynamic structure factors S(q, ω) with wave vector q and frequency ω."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DECADES = 6
 def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
     """Return a figure of log S(q, ω) over ω ≥ 0 and over q along the first axis of the lattice.
 
-    Along the other axes q is 0.
+    The other components of the wave vector q are 0.
     """
     from matplotlib.figure import Figure
 

@@ -15,7 +15,7 @@ from phigen.spec.names import KEPT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: If a sweep has no observables, the first of these results that is in the store is drawn.
+#: Results to draw if a sweep has no observables. The first one that is in the store is drawn.
 _PREFERRED_RESULTS = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
 #: A scale is logarithmic if the ratio of the largest to the smallest value exceeds this number.
@@ -31,9 +31,9 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 def draw(store: Path, path: Path, requested: str | None = None, origin: str = "") -> None:
     """Draw the variable ``requested`` of a store into a file.
 
-    By default the observables and their means are drawn. If there are none, the first of `_PREFERRED_RESULTS` in the
-    store is drawn. The metadata of the file contain the text ``origin``. Raises `FileError` if the store has no such
-    variable.
+    By default the observables and their means are drawn. If the sweep has no observables, the first of the
+    `_PREFERRED_RESULTS` in the store is drawn. The metadata of the file contain the text ``origin``. Raises `FileError`
+    if the store does not contain the variable.
     """
     import xarray
 
@@ -105,11 +105,10 @@ def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
     """Draw values as curves or as a map; return a note for the title.
 
-    Observables are drawn as curves over one dimension. If there is a second dimension with few values, there is a curve
-    for each value. If members differ in their random numbers (dimension ``seed``), the means over these members are
-    drawn with their standard errors. Other variables over two dimensions are drawn as maps. So are observables if both
-    dimensions have many values. If there are more than two dimensions, the median over the others is drawn. The note
-    explains the error bars, and names the dimensions over which means or medians were taken.
+    Values over one dimension are drawn as a curve, and values over two dimensions as a map. If one of the two
+    dimensions has few values, an observable is drawn as one curve for each of these values. If there are more than two
+    dimensions, the median over the further dimensions is drawn. For observables, the mean over the dimension ``seed``
+    (random numbers) is drawn with error bars. The note says which means, medians and errors are shown.
     """
     note = " ± standard error" if errors is not None else ""
     if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
