@@ -1,7 +1,7 @@
 """Computation of one chunk of members of a sweep: the runs, their results, and the entries in the store.
 
-This is the work of a process, which receives the path of the store and the number of the chunk. The store contains the
-solver and the plan.
+A worker process receives the path of the store and the number of the chunk. The store contains the solver and the
+plan.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 def make(store: str, digest: str, number: int) -> tuple[int, int]:
     """Compute the members of a chunk, store their results, and return the numbers of members and of failed members.
 
-    ``digest`` identifies the content of the store. It is compared with the digest of the store that this process has
-    read at the same path before. If they differ, the new store is read.
+    ``digest`` identifies the content of the store. A process reads a store once, and again only if another store, with
+    another digest, has replaced it.
     """
     job, solver = _ready(store, digest)
     plan = job.plan
@@ -69,8 +69,9 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _exclusive_lock(name: str) -> Iterator[None]:
-    """Return a context that only one process of this machine at a time can enter. Locks are distinguished by
-    ``name``.
+    """Return a context that only one process of this machine at a time can enter.
+
+    Contexts with different names do not exclude each other.
     """
     try:
         import fcntl
@@ -175,14 +176,17 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
         for sign in signs:
             along = sign * np.sign(some.h) * values
             rises = (along[:-1] < 0) & (along[1:] >= 0)
-            # A start on the section counts as a crossing if the function then grows.
+            # A start on the section counts as a crossing if the run then leaves it in the direction of the crossings.
             rises[:1] |= (along[:1] == 0) & (along[1:2] > 0)
             counts[part] += rises.sum(axis=0)
     return counts
 
 
 def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> Floats:
-    """Return the largest Lyapunov exponent of each member, from the tangent maps of its steps; NaN if it failed."""
+    """Return the largest Lyapunov exponent of each member, from the tangent maps of its steps.
+
+    The exponent of a member that failed is NaN.
+    """
     from phigen.errors import StepError
     from phigen.study.lyapunov import spectrum
 

@@ -1,8 +1,8 @@
 """Plan of a sweep: dimensions, chunks, and the values of each member, computed on demand.
 
-A plan is stored with the results, as JSON. It documents them, and contains all settings that a worker process needs.
-Members are numbered from 0; if the sweep has several dimensions, the last one varies fastest. A chunk is a box of
-members with consecutive numbers.
+A plan is stored with the results, as JSON. It contains all settings that a worker process needs. Members are numbered
+from 0; if the sweep has several dimensions, the last one varies fastest. A chunk is a box of members: a range of
+indices along each dimension.
 """
 
 from __future__ import annotations
@@ -156,9 +156,9 @@ def values_of(axis: Axis) -> Floats:
 
 
 def _spaced(axis: Axis, share: Floats) -> Floats:
-    """Return the values at the fractions ``share``, from 0 to 1, of the interval between the ends of an axis.
+    """Return values between the ends of an axis. A ``share`` of 0 gives the first end, and 1 gives the last.
 
-    With the scale log they are fractions of the interval of logarithms.
+    On the scale ``linear`` the values are linear in ``share``; on the scale ``log`` their logarithms are.
     """
     first, last = axis.ends
     if axis.scale == "log":

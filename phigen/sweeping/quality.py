@@ -1,4 +1,4 @@
-"""Detection of members of a sweep whose results are meaningless. Such members have large energy errors."""
+"""Detection of members of a sweep whose results are meaningless, by their large energy errors."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Number (``count``) of members of a sweep whose relative energy error exceeds a limit, and the ``largest``
-    error."""
+    """Number ``count`` of the members whose relative energy error exceeds a limit, and the ``largest`` error."""
 
     count: int = 0
     largest: float = 0.0
@@ -27,9 +26,9 @@ class EnergyErrors:
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
     """Return the number of members of a sweep whose stored energy error exceeds ``limit``, and the largest error.
 
-    Errors are relative to the initial energy. If the terms of the initial energy nearly cancel, errors are relative to
-    the sum of their absolute values. Members that failed or are not computed yet are not counted. If time, forces or
-    noise change the energy, no member is counted.
+    Errors are relative to the initial energy. If the terms of H nearly cancel at the start, errors are relative to the
+    sum of the absolute values of the terms. Members that failed or are not computed yet are not counted. If time,
+    forces or noise change the energy, no member is counted.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
@@ -43,8 +42,8 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
     """Return the number of members of a sweep of a lattice whose energy error exceeds ``limit``, and the largest error.
 
-    Errors are relative to the initial energy. The store does not contain it, so the initial states of all members are
-    computed again.
+    Errors are relative to the initial energy, or to the sum of |energy of a site| if the energies of the sites nearly
+    cancel. The store does not contain the initial energies, so they are computed again.
     """
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()
@@ -60,7 +59,8 @@ def _count_large_errors(
 ) -> EnergyErrors:
     """Return the number of members whose relative energy error exceeds ``limit``, and the largest error.
 
-    ``at_start(varied, count)`` returns the initial energies of members, and the sums of absolute values of their terms.
+    ``at_start(varied, count)`` returns the initial energies of members, and for each member the sum of the |terms| of
+    its initial energy.
     """
     if "energy_error" not in job.plan.keep:
         return EnergyErrors()

@@ -76,8 +76,8 @@ class Job:
     def section(self) -> tuple[Callable[[Floats, Mapping[str, Floats]], Floats], str, tuple[float, ...]]:
         """Return the section of the run: a function that is 0 on it, the name of the time, and the signs of crossings.
 
-        The function takes states (…, DIM), and the values of parameters and time by name. The sign of a crossing is its
-        direction.
+        The function takes states (…, DIM), and the values of parameters and time by name. The sign 1 stands for rising
+        crossings, the sign −1 for falling ones.
         """
         from phigen import spec as specs
         from phigen.symbolic.arrays import evaluate

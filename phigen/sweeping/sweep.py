@@ -45,9 +45,9 @@ _LEAST, _MOST = 32, 1 << 17
 
 @dataclass(frozen=True)
 class SweepSetting:
-    """Where and how a sweep is computed: the store ``output``, the workers, and options of the solver.
+    """Options for the computation of a sweep: the store ``output``, the workers, and options of the solver.
 
-    If ``target`` is None, the target of the sweep is used.
+    If ``target`` is None, the target that the spec states for the sweep is used.
     """
 
     output: Path
@@ -86,9 +86,9 @@ def made(
 ) -> Outcome:
     """Compute the members of a sweep that its store does not contain yet.
 
-    ``started`` receives the number of these members. ``tell`` receives the numbers of computed and failed members after
-    each chunk. Raises `SpecError`; `FileError` if the store contains another sweep; `LimitError` if the chunks that are
-    computed at the same time do not fit into memory; and `SweepError` if the computation stops.
+    ``started`` receives the number of members to compute. After each chunk, ``tell`` receives the numbers of computed
+    and of failed members. Raises `SpecError`; `FileError` if the store contains another sweep; `LimitError` if the
+    chunks that are computed at the same time do not fit into memory; and `SweepError` if the computation stops.
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
@@ -161,7 +161,7 @@ def _with_ensembles(spec: Spec) -> Spec:
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """Raise `LimitError` if the values along a dimension do not fit into memory. Two arrays of them are needed."""
+    """Raise `LimitError` if two arrays with the values along a dimension do not fit into memory."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
