@@ -1,4 +1,4 @@
-"""Redrawn figure of the paper, with measured numbers. They can be compared with the numbers of the paper."""
+"""Redrawn figure of the paper, with measured numbers to compare with the numbers in the paper."""
 
 from __future__ import annotations
 
