@@ -19,7 +19,7 @@ Factored = tuple[Expression, Mapping[str, int]]
 
 
 def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
-    """Return the expressions with the powers of each symbol in ``names`` combined, so that m·m⁻¹ becomes 1."""
+    """Return the expressions after combining the powers of each symbol in ``names``: m·m⁻¹ becomes 1."""
     return [_multiplied(f) for f in _factored(values, names)]
 
 
@@ -31,7 +31,10 @@ def divided(e: Expression, exponents: Mapping[str, int]) -> Expression:
 
 
 def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[str, int]:
-    """Return the exponents of the greatest powers of the symbols ``names`` that divide all expressions."""
+    """Return the greatest exponent k of each symbol in ``names`` for which symbol^k divides all expressions.
+
+    Symbols with k = 0 are left out.
+    """
     exponent_maps = [exponents for _, exponents in _factored(values, names)]
     lowest = (
         {name: min(exponents.get(name, 0) for exponents in exponent_maps) for name in names} if exponent_maps else {}
@@ -46,12 +49,11 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 
 @dataclass(frozen=True)
 class SumFactors:
-    """The common factor of all forces of bonds or pairs on one field.
+    """The common factor of the forces that bonds or pairs exert on one field.
 
-    It is a product of powers of parameters that have a value at every site and may be 0. The sums over bonds and pairs
-    are computed without the factor, and then multiplied by ``at_site``, the factor at the site of the sum. ``at_end``
-    has the same factor in another form: it maps the symbols of the parameters at end a of a bond or pair, such as
-    ``m[a]``, to their exponents. End a is at the site of the sum.
+    The factor is a product of powers of parameters that have a value at every site and may be 0. Solvers sum the forces
+    without this factor, and then multiply the sum by ``at_site``, the factor at the site. ``at_end`` is the same
+    factor, written for a bond or pair whose end a is the site: it maps symbols such as ``m[a]`` to their exponents.
     """
 
     at_site: Expression = ONE

@@ -29,9 +29,10 @@ class Cell:
     ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` for each axis.
     Graphs and pairs have neither. ``bracket`` maps (f, g) to {f, g}, where f is a field at the site and g the symbol of
     a field at the site or at a neighbour. It contains all nonzero brackets, in both orders. ``bond_bracket`` maps
-    ("f[a]", "g[b]") and ("g[b]", "f[a]") to the bracket along a bond. ``hamiltonian`` is the energy density of a site,
-    ``bond_hamiltonian`` the energy of a bond from a to b, and ``pair_hamiltonian`` the energy of a pair. H is the sum
-    of all three over all sites, bonds and pairs. Terms that reach beyond an open end are left out (see `terms`).
+    ("f[a]", "g[b]") to the bracket {f[a], g[b]} along a bond; it has all nonzero brackets along bonds, in both orders.
+    ``hamiltonian`` is the energy density of a site, ``bond_hamiltonian`` the energy of a bond from a to b, and
+    ``pair_hamiltonian`` the energy of a pair. H is the sum of all three over all sites, bonds and pairs. Terms that
+    reach beyond an open end are left out (see `terms`).
 
     ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
     ``invariants`` are sums over sites. ``time`` is the symbol of t in H and in the invariants; it is "" if nothing
@@ -160,8 +161,9 @@ class Cell:
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """The largest distance along each axis from the site of f to another site of a bracket {f, g}. This may be the
-        site of g, or a site that the value of the bracket depends on.
+        """For each axis, the largest distance from the site of f to another site of a bracket {f, g}.
+
+        The sites of a bracket are those of f and g, and all sites on which the value of the bracket depends.
         """
         second_fields = [symbol(other) for _, other in self.bracket]
         return self._reach([*second_fields, *self.bracket.values()])
@@ -206,8 +208,8 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """Return the terms of ∂H/∂f at a site of a grid, for each field f. These are the derivatives of all terms of H that
-    read the site.
+    """Return the terms of ∂H/∂f at a site of a grid, for each field f: one for each term of H that reads f at this
+    site.
     """
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:

@@ -15,10 +15,9 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size in a run that does not fit the colours of sites: it is not a multiple of the period of the
-    colours.
+    """The number of sites along an axis in a run, if it is not a multiple of the period of the colours.
 
-    ``fitting`` is a multiple of the period near ``size``.
+    ``size`` is this number. ``fitting`` is a multiple of ``period`` near ``size``.
     """
 
     run: str
@@ -32,10 +31,9 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Error for runs whose sizes do not fit the colours of sites, that is, are not multiples of the periods of the
-    colours.
+    """Error for runs in which the number of sites along an axis is not a multiple of the period of the colours.
 
-    ``reason`` names these sizes in one line.
+    ``reason`` names these numbers in one line.
     """
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
@@ -130,11 +128,10 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line for the header of generated files. It names all sizes that do not fit the colours of
-    sites.
+    """Return one line for the header of generated files: which sizes do not fit the colours of sites, and which sizes
+    would.
 
-    ``colours`` is the number of colours of the splitting. The line says that this splitting is not possible with these
-    sizes, and names sizes with which it is possible. If there are no ``wrong_sizes``, the result is "".
+    ``colours`` is the number of colours of the splitting. The result is "" if there are no ``wrong_sizes``.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"

@@ -1,4 +1,4 @@
-"""Search for a part of H that can be the potential V of a Nyström method on a lattice, where H = T + V.
+"""Search for the parts V of H = T + V on a lattice that can be the potential of a Nyström method.
 
 On grids, the flow of the modified potential V + κ{V, {V, T}} is computed too; see `phigen.splitting.kicks`. The bracket
 {F, G} of two sums F and G over sites is again a sum over sites s. A field f at the site s and a field g at the site s +
@@ -72,7 +72,7 @@ def _degree(cell: Cell, e: Expression, fields: set[str]) -> float:
 def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) -> CellFlow | None:
     """Return the flow of V + κ{V, {V, T}}, the modified potential of a Nyström method, for parts V and T of H.
 
-    Returns None if the bracket is 0, or if it has too many terms.
+    Returns None if {V, {V, T}} is 0, or if it has too many terms.
     """
     potential, kinetic = ([s for s, _ in flow.summands] for flow in (v, t))
     twice = list(_bracket(cell, potential, list(_bracket(cell, potential, kinetic))))

@@ -1,8 +1,9 @@
-"""The monitor of lattices in which all pairs of sites interact: steps of equal size in another time than t.
+"""The monitor of lattices in which all pairs of sites interact: steps of equal size in a rescaled time τ.
 
-The Hamiltonian for this time is K = log(A + e) − log(−B), where H = A + B. A and B are sums over all sites and pairs,
-and e = −H(x₀). A is constant along its own flow, and so is B. Therefore the flow of each part of K is the flow of A or
-B over another duration; see `phigen.scheme.logarithmic`. The steps in t vary, but are the same for all sites.
+The Hamiltonian for τ is K = log(A + e) − log(−B), where H = A + B and e = −H(x₀). A and B are sums over all sites and
+pairs. A is constant along the flow of A, and B along the flow of B. Therefore the flow of each part of K is the flow of
+A or B over another duration; see `phigen.scheme.logarithmic`. The steps in the time t vary, but each step is the same
+for all sites.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: Symbol for the variation of the duration of a flow, in kernels of the tangent map.
+#: Symbol in kernels of the tangent map: the derivative, along a tangent vector, of the duration of a flow.
 LATE = Symbol("late")
 
 
@@ -54,10 +55,10 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the index of the negative part B of H = A + B, which the monitor log(A + e) − log(−B) needs.
+    """Return the index of the part B of H = A + B that is negative, since the monitor contains log(−B).
 
-    The sign is decided for all states or, if that fails, at the initial states of all runs. Raises `SpecError` unless
-    there are two parts, one of them negative.
+    A part that is negative at all states comes first. Otherwise, a part that is negative at the initial states of all
+    runs is sufficient. Raises `SpecError` unless there are two parts, one of them negative.
     """
     if len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
@@ -107,10 +108,11 @@ def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
 def rates_of(
     cell: Cell, flows: Sequence[CellFlow], negative: int, *, tangent: bool
 ) -> tuple[PartRates, list[tuple[str, BondSum]]]:
-    """Return the kernels of the energies of the parts of H = A + B, and the sums over pairs that these kernels read.
+    """Return the kernels that compute the energies A and B of the two parts of H, and the sums over pairs in these
+    energies.
 
-    Each sum comes with the name of its kernel. With ``tangent``, kernels and sums for the variations of the energies
-    are added.
+    Each sum comes with the name of its kernel. If ``tangent``, kernels and sums for the derivatives of the energies
+    along a tangent vector are added.
     """
     energies, slopes, sums = list[Kernel](), list[Kernel](), list[tuple[str, BondSum]]()
     sum_symbol = Symbol(GATHERED, "energy")
@@ -134,10 +136,9 @@ def fact(flows: Sequence[CellFlow], negative: int) -> str:
 
 
 def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
-    """Return the variations of the increments of a flow along a tangent vector, if the duration of the flow varies too.
+    """Return the derivatives, along a tangent vector, of the increments of a flow whose duration depends on the state.
 
-    ``slopes`` are the variations of the increments at a fixed duration; the symbol `LATE` is the variation of the
-    duration.
+    ``slopes`` are the derivatives at a fixed duration. The symbol `LATE` stands for the derivative of the duration.
     """
     rates = (gradient(e, [TIME])[0] for e in increments)
     return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

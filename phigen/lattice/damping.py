@@ -61,7 +61,7 @@ class _NoFlowError(Exception):
 
 
 class _TogetherError(_NoFlowError):
-    """The damping has no elementary flow with this colouring; another colouring may have one."""
+    """The damping has no elementary flow with the colouring that was tried; another colouring may have one."""
 
 
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:

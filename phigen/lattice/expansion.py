@@ -1,6 +1,7 @@
-"""Expansion of a small lattice: an ordinary spec with a coordinate for each field of each site.
+"""Expansion of a small lattice: a spec without the key ``lattice``, with a coordinate for each field of each site.
 
-The expansion defines the meaning of a lattice spec: the lattice must have the same equations of motion.
+This spec is called the ordinary spec. It defines the meaning of the lattice: the lattice must have the same equations
+of motion.
 """
 
 from __future__ import annotations

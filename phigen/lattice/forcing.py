@@ -61,11 +61,11 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
 
 
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of πζ, with the covector force ζ, which includes damping.
+    """Return the flows of πζ, where the covector force ζ includes damping.
 
-    If πζ has an elementary flow, there is this single flow. Otherwise there is one flow for each component of ζ. If a
-    component has no elementary flow, damping gets flows of its own (`phigen.lattice.damping`). The other forces in ζ
-    then have one flow together or, if that is not elementary, one flow for each component.
+    If the flow of πζ is elementary, it is the only flow. Otherwise there is one flow for each component of ζ. If the
+    flow of a component is not elementary, damping gets flows of its own (`phigen.lattice.damping`). The sum of all
+    other forces in ζ then has one flow or, if this flow is not elementary, one flow for each component.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
@@ -178,7 +178,7 @@ def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
 def force_statements(cell: Cell) -> Iterator[Statement]:
     """Yield the statements on forces: which Casimirs they preserve, and at which rate damping dissipates energy.
 
-    The second statement follows from π being skew, which is proved elsewhere.
+    The rate is a consequence of π being skew, which `phigen.lattice.proofs.tensor` proves.
     """
     if not cell.forces:
         return
@@ -193,7 +193,7 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
 
 
 def noise_statements(cell: Cell) -> Iterator[Statement]:
-    """Yield statements on noise: whether the sources commute, and which density is stationary.
+    """Yield statements on noise: whether the sources commute, and which probability density is stationary.
 
     The statements are decided at one site, with symbols for the gradient of H, if two conditions hold: noise, damping
     and brackets at a site read no neighbours, and there are no forces except damping. Otherwise they are decided on a

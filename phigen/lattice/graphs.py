@@ -1,9 +1,9 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
-The copies of a term on two bonds may not commute if the bonds share a site. The sites are then coloured at run time,
-when the bonds are known. No bond connects two sites of one colour. A part contains the terms of one colour: each term
-is summed over the bonds that begin at sites of the colour or, for some terms, over the bonds that end there. A step
-applies the flows of all colours one after the other.
+If two bonds share a site, the copies of a term on these bonds need not commute. In this case the sites are coloured at
+run time, when the bonds are known, so that no bond connects two sites of one colour. A part contains the terms of one
+colour: each term is summed over the bonds that begin at sites of the colour or, for some terms, over the bonds that end
+there. A step applies the flows of all colours one after the other.
 
 Two terms may be mirror images under the exchange of the ends a and b, such as x[a]*y[b] and y[a]*x[b] in a cross
 product. Two such terms are in one part: one is summed over the bonds that begin at sites of the colour, and the other
@@ -179,10 +179,10 @@ class _SiteEquation:
         return sums
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
-        """Return the sums over bonds in the equation of motion that stem from brackets along bonds, and add terms with
-        these sums to ``rates``.
+        """Return the sums over bonds by which brackets along bonds enter the equation of motion.
 
-        Each term is the product of a monomial in the fields of the site and a sum over the neighbours of the site.
+        The function also adds terms with these sums to ``rates``. Each term is the product of a monomial in the fields
+        of the site and a sum over the neighbours of the site.
         """
         selection = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
@@ -270,9 +270,10 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 
 
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
-    """Return the sums for the two ends of bonds as a single element if their summands are proved to be equal.
+    """Merge the sums over the bonds that begin at a site with the sums over the bonds that end there.
 
-    Otherwise both are returned. Sums that are 0 are left out. Sums with ``chosen`` = "here" stay separate.
+    The result has one element if the summands are proved to be equal, otherwise one for each end. Sums that are 0 are
+    left out. Sums with ``chosen`` = "here" are never merged.
     """
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]

@@ -18,12 +18,11 @@ ROUNDS = 60
 
 
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
-    """Return positions of the sites in the unit square, of shape (sites, 2), or None for more than
-    `MOST_PLACED` sites.
+    """Return positions of the sites in the unit square, of shape (sites, 2), or None for more than `MOST_PLACED` sites.
 
-    The starting positions are the classical scaling of distances along ``bonds``, with the two largest eigenvalues.
-    Iterations of stress majorisation improve the positions: J. de Leeuw, Applications of convex analysis to
-    multidimensional scaling (1977). The same bonds always give the same positions.
+    The distance of two sites is the number of bonds between them. Classical multidimensional scaling of these distances
+    gives the starting positions. Iterations of stress majorisation improve the positions: J. de Leeuw, Applications of
+    convex analysis to multidimensional scaling (1977). The same bonds always give the same positions.
     """
     if sites > MOST_PLACED:
         return None

@@ -264,8 +264,8 @@ def _box(cell: Cell) -> tuple[int, ...]:
 def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], domain_text: str = "") -> Statement:
     """Return a statement that ``examine`` decides on a box with open ends.
 
-    In one dimension, ``examine`` decides it on all smaller boxes as well. If the box has too many coordinates, the
-    statement remains undecided.
+    In one dimension, boxes with fewer sites are examined as well. If the box has too many coordinates, the statement
+    remains undecided.
     """
     sizes = _box(cell)
     count = len(cell.fields)

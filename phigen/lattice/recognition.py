@@ -211,7 +211,8 @@ def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Para
 def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> tuple[Site, Expression]:
     """Return the site at which a term is placed, and the term translated from there to the origin.
 
-    The site is ``base`` if it is passed, else the corner of the smallest box that contains all symbols of the term.
+    The site is ``base`` if this argument is passed. Otherwise it is the first corner of the smallest box that contains
+    the sites of all symbols in the term.
     """
     places = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
     if base is None:
@@ -259,8 +260,8 @@ def _key(e: Expression, names: _SiteNames) -> float:
 def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
     """Return the terms of a density whose sum over all sites is the sum of ``terms``.
 
-    Each of the ``terms`` comes with its site. It must occur equally often at every site at which it fits between open
-    ends; else `_NoLatticeError` is raised.
+    Each of the ``terms`` comes with its site. Raises `_NoLatticeError` unless each term occurs equally often at all
+    sites at which the term fits between open ends.
     """
     kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
     for base, term in terms:

@@ -6,13 +6,13 @@ and a velocity V_i, which is its relative momentum divided by its reduced mass. 
 m_i, and then have a limit at m_i = 0: a body without mass is attracted by others, but attracts none. The parts have
 these flows:
 
-- A moves Q_i and V_i along a conic section, as the attraction of a mass M_i does, and the centre of mass uniformly;
+- A moves Q_i along a conic section, as the attraction of a mass M_i at 0 does, and the centre of mass along a line;
 - B changes V_i by the attraction of the other bodies.
 
 In Jacobi coordinates, M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all other bodies. The acceleration
-of Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B causes the difference of this acceleration and −γ M_i
-Q_i/|Q_i|³, the acceleration in the Kepler motion. In democratic heliocentric coordinates, M_i = m_0. There B contains
-the attraction by all bodies but the first. It also moves all Q_i with the velocity Σ m_j V_j/m_0.
+of Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. The Kepler motion has the acceleration −γ M_i Q_i/|Q_i|³, and B
+causes the rest of the acceleration of Q_i. In democratic heliocentric coordinates, M_i = m_0, and B contains the
+attraction by all bodies but the first. In these coordinates, B also moves all Q_i with the velocity Σ m_j V_j/m_0.
 """
 
 from __future__ import annotations
@@ -159,8 +159,8 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
     """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    In democratic heliocentric coordinates, the flow of B adds the velocity Σ m_j V_j/m_0 to all positions. There,
-    sweeps with sums over pairs also compute this sum.
+    In democratic heliocentric coordinates, B moves all positions with the velocity Σ m_j V_j/m_0. In these coordinates,
+    sweeps that compute sums over pairs also compute this velocity.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 

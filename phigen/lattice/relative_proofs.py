@@ -192,8 +192,10 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield residuals that are 0 if ``flow`` has the rates of change of the vector field of the remainder B
-        of H.
+        """Yield residuals that are 0 if ``flow`` solves the correct equations of motion.
+
+        The equations are Q̇_i = w_i ∂B/∂V_i and V̇_i = −w_i ∂B/∂Q_i with B = H − A (see `remainder`) and the reduced
+        masses 1/w_i.
         """
         (motion,), b = flow.motions, self.remainder()
         for i in self.others:

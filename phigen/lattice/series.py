@@ -188,9 +188,9 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
     """Return formulas by field in which the covectors p at all sites are replaced by expressions.
 
-    ``maps`` has the formulas in symbols for p, such as that for the increment of x in a stage. The expressions are p =
-    h(∇H + ζ) + Σ ΔW σ∇g, with the covector force ζ. The sum is over the sources of noise, with their increments ΔW,
-    amplitudes σ and Hamiltonians g.
+    ``maps`` has formulas with symbols for p, for instance the formula for the increment of x in a stage. The
+    expressions that replace p are p = h(∇H + ζ) + Σ ΔW σ∇g, with the covector force ζ. The sum is over the sources of
+    noise, with their increments ΔW, amplitudes σ and Hamiltonians g.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
@@ -204,8 +204,7 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return the formulas for a stage with a vector force f: those for y, and those for the increment of x, by
-    field.
+    """Return two sets of formulas, by field, for a stage with a vector force f: for y, and for the increment of x.
 
     Half of the impulse hf acts before the stage, and half after it.
     """

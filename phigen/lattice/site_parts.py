@@ -1,10 +1,10 @@
 """The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
-A part V of H is a sum over sites of terms whose coordinates commute over the whole lattice. The gradient of V is
-constant along the flow of V. So each site has its own equation of motion ẋ = Σ_a {x, a} ∂V/∂a, where the sum is over
-all coordinates a, and values at neighbours are constants. If π couples neighbours, or if a term mixes coordinates that
-do not commute, the sites are coloured. Then the terms that begin at sites of one colour form a part. Terms that are
-functions of a single site also form parts if they have an elementary flow.
+A part V of H is a sum of terms at sites. All coordinates in these terms commute with each other. So the gradient of V
+is constant along the flow of V, and each site has its own equation of motion ẋ = Σ_a {x, a} ∂V/∂a, where the sum is
+over all coordinates a, and values at neighbours are constants. If π couples neighbours, or if a term mixes coordinates
+that do not commute, the sites are coloured. Then the terms that begin at sites of one colour form a part. Terms that
+are functions of a single site also form parts if they have an elementary flow.
 
 Some sizes are not multiples of the period of the colours, as for a ring with two colours and an odd number of sites.
 Then the colours are counted from site 0 on, and the last sites along an axis are the boundary *seam*. Terms that begin
@@ -114,8 +114,8 @@ class Colouring:
     def with_seams(self, cell: Cell) -> Colouring:
         """Return the colouring with seams so wide that terms at the two ends of a seam commute.
 
-        The equations of motion at one end of a seam may read values at the other end, if these are constant along the
-        flow.
+        The equations of motion at one end of a seam may read a value at the other end, if this value is constant along
+        the flow.
         """
         return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 
@@ -143,9 +143,9 @@ class SiteMotion:
 
     The ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or
     pairs. ``gathered`` lists the sums; symbols `GATHERED` stand for them. ``solution`` has the same increments, with a
-    symbol `FORCE` in place of each component of the gradient of the part. It solves ẋ = ``rates``. For damping,
-    ``components`` has the values of the symbols `FORCE`, since the force is not the gradient of a part. ``manner``
-    describes the motion in words.
+    symbol `FORCE` in place of each component of the gradient of the part. These increments solve ẋ = ``rates``. For
+    damping, ``components`` has the values of the symbols `FORCE`, since the force is not the gradient of a part.
+    ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -160,9 +160,9 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    The flow of a term of H updates sites up to ``separation`` away from the site where the term begins. If each bracket
-    {f, g} depends only on the sites of f and g, the equations of motion read no sites farther away. Otherwise a seam
-    must be wider.
+    The flow of a term of H updates sites up to the distance ``near`` from the site where the term begins. If the value
+    of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no sites beyond this
+    distance. Otherwise a seam must be wider.
     """
     if period == 1:
         return Seam()
@@ -196,8 +196,8 @@ class CellFlow(Flow):
     ``summands`` are the terms of the part, each with the colours of the sites where it begins. On a graph,
     ``by_colour`` is true if the part has only the terms of one colour; a step then applies the flow once for each
     colour. If the colouring has boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set
-    of seams, as a bit mask over the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these
-    seams.
+    of seams, as a bit mask over the axes (see `Colouring.windows`): ``beside`` is the motion under the terms that begin
+    on exactly these seams.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -388,8 +388,8 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near boundary seams. A seam is at the last sites along an axis, where colours
-        break their period.
+        """Return the motion of sites near boundary seams. A seam is at the last sites along an axis, where the colours
+        do not repeat.
 
         Returns None if there are no seams, or if the part has the terms of all colours, so that seams make no
         difference.
@@ -413,9 +413,8 @@ class PartSearch:
         shift: Offset = (),
         factor: Expression = ONE,
     ) -> Expression:
-        """Return ∂V/∂field at the site that is ``shift`` away, where V is the sum of the terms ``part``.
-
-        Terms of bonds are left out.
+        """Return ∂V/∂field at the site that is ``shift`` away. V is the sum of the terms ``part``, except terms of
+        bonds.
 
         ``colour`` is the colour of that site. Each term has a weight that is 0 if the term reaches beyond an open end.
         If ``colour`` is None, the site is near a boundary seam, and the weight also depends on the site where the term
@@ -516,8 +515,9 @@ class PartSearch:
         return any((g, self.colouring.at(colour, d)) in coordinates for g, d in self._couples.get(field, ()))
 
     def _site_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
-        """Return the flow of the sum of ``terms``, which are functions of one site, or several flows if this one is not
-        elementary.
+        """Return the flow of the sum of ``terms``, which are functions of one site.
+
+        If the flow of the sum is not elementary, the result has flows of several smaller sums.
         """
         if not terms:
             return []

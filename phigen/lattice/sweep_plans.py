@@ -229,11 +229,11 @@ def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
-    """Return the method with additional flows for the terms that begin on boundary seams, where colours break their
-    period.
+    """Return the method with additional flows for the terms that begin on boundary seams, where the colours do not
+    repeat.
 
     The flows on seams follow directly after the flow of the same part of H on all other sites. For the last part the
-    order is reversed, so that its flow on all other sites comes last.
+    order is reversed: its flow on all other sites comes after its flows on seams.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -245,8 +245,7 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield the flows of the terms of a part of H that begin on boundary seams, where colours break their
-    period.
+    """Yield the flows of the terms of a part of H that begin on boundary seams.
 
     There is one flow for each set of seams on which a site may lie.
     """
@@ -291,8 +290,7 @@ def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSpl
 def _seamed(
     cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
-    """Return the parts of H and the flows of forces for a colouring with boundary seams, where colours break their
-    period.
+    """Return the parts of H and the flows of forces for a colouring with boundary seams.
 
     Seams allow sizes that are no multiples of the period. Returns None if a run is too small for its seams, an axis has
     open ends, or sites near seams have no elementary flow.
@@ -461,9 +459,9 @@ def _sweep(
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients, *, late: bool) -> Sweep:
-    """Return the tangent kernel of a sweep, which computes variations of the increments.
+    """Return the tangent kernel of a sweep: the derivatives of the increments along a tangent vector.
 
-    If ``late``, the duration of the flow varies as well.
+    ``late`` says that the duration of the flow depends on the state, so that it is differentiated too.
     """
     increments = list(motion.increments.values())
     slopes = along(cell, increments)
@@ -578,7 +576,7 @@ def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
 def _operations(step: Sweeps) -> dict[str, int]:
     """Return the numbers of operations of a step per site, by the kind of operation."""
     times = Counter(part for part, _ in step.schedule.flows)
-    if step.by_colour:  # for each colour but the first and the last, a part runs twice in a stage
+    if step.by_colour:  # a stage applies the flow of a colour twice, except for the first and the last flow
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     totals: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):
