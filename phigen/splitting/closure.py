@@ -1,10 +1,9 @@
-"""Linear equations for coordinates along the flow of a part G of H, found by repeated differentiation of
-monomials.
+"""Linear equations for coordinates along the flow of a part G of H, found by repeated differentiation of monomials.
 
 The derivative of a coordinate along the field π∇G is a polynomial in the variables that change along the flow. Each new
-monomial in it is added to a list, and differentiated in turn. If at last no new monomials occur, the monomials w in the
-list satisfy ẇ = Aw, and A contains only quantities that are constant along the flow. Kicks, drifts, rotations, shears
-and scalings are special cases, as are triangular polynomial equations.
+monomial in this polynomial is added to a list, and differentiated in turn. The search ends when no new monomials occur.
+Then the monomials w in the list satisfy ẇ = Aw, where A contains only quantities that are constant along the flow.
+Kicks, drifts, rotations, shears and scalings are special cases, as are triangular polynomial equations.
 """
 
 from __future__ import annotations
@@ -15,8 +14,9 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Bounds for a list of monomials w with ẇ = Aw: the number of its monomials, their degree, and the number of monomials
-#: if all are single coordinates. Longer lists are treated as infinite.
+#: Bounds for a list of monomials w with ẇ = Aw. MOST_DEGREE is the largest degree of a monomial. MOST_MONOMIALS is the
+#: largest number of monomials in the list; if all of them are single coordinates, it is MOST_COORDINATES. Lists beyond
+#: these bounds are treated as infinite.
 MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]
@@ -49,8 +49,9 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """Return the motion along a vector field. Coordinates for which there are linear equations get these equations. The
-    others get their rates; coordinates that are constant get nothing.
+    """Return the motion along a vector field.
+
+    A coordinate has linear equations if phigen finds any, else its rate. Constant coordinates are left out.
     """
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}

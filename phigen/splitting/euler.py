@@ -88,8 +88,8 @@ class EulerMotion:
 class Addition:
     """The quantities of the addition theorem for the flow of a free rigid body from the state ``x``.
 
-    These are P, R, κ, the first integrals E_i (``levels``), and three expressions whose signs give the order of the
-    E_i; see the formulas of this module.
+    These are P, R, κ, the E_i (``levels``), and three expressions whose signs give the order of the E_i
+    (``conditions``); see the formulas of this module.
     """
 
     x: Vector
@@ -151,8 +151,10 @@ class Addition:
 
 
 def levels_of(x: Vector, factors: Vector) -> list[Expression]:
-    """Return the first integrals E_i = α_j α_k x_i² of the free rigid body ẋ_i = α_i x_j x_k; ``factors`` are the
-    α_i."""
+    """Return E_i = α_j α_k x_i² for the free rigid body ẋ_i = α_i x_j x_k; ``factors`` are the α_i.
+
+    The differences of the E_i are first integrals.
+    """
     return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
 
 

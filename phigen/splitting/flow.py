@@ -30,10 +30,10 @@ from phigen.symbolic.tower import Poly, Tower
 #: Motions with special formulas for their flows. The formulas are proved by identities in independent symbols.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
-#: Methods for linear equations ẇ = Aw, in the order in which they are tried. A function with such a method as its
-#: argument tries this method and those before it. CLOSED_FORMS: formulas for exp(tA). EXPONENTIALS: matrices exp(tA)
-#: that are computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if A depends on the state and has
-#: at most four rows.
+#: Methods for linear equations ẇ = Aw, in the order in which they are tried. A function with the argument ``methods``
+#: tries this method and all methods before it. CLOSED_FORMS: formulas for exp(tA). EXPONENTIALS: matrices exp(tA) that
+#: are computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if A depends on the state and has at
+#: most four rows.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
 #: Description of a linear motion by a matrix exponential that is computed before the steps, for reports.
@@ -169,8 +169,8 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
 
 
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
-    """Return the flow of a sum of terms, from its equations of motion as a whole, or the reason why there is
-    none.
+    """Return the flow of a sum of terms, or the reason why phigen finds none. The equations of motion of the sum are
+    solved as a whole.
 
     If ``linear``, only linear equations are solved. Their solutions have full relative precision even for small
     coordinates. Other solutions may compute a coordinate as the difference of a constant sum and other coordinates,

@@ -66,7 +66,8 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
 def _equations(field: Sequence[Poly], moving: Sequence[int]) -> list[dict[int, object]]:
     """Return the linear equations for the c_k in Σ_k c_k field_k = 0, one row for each monomial of the field.
 
-    ``moving`` has the indices of the components that are not 0; k counts these.
+    ``moving`` has the indices of the components that are not 0. A row maps k to the coefficient of c_k, where k is a
+    position in ``moving``.
     """
     rows: dict[tuple[int, ...], dict[int, object]] = {}
     for k, i in enumerate(moving):

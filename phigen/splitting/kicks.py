@@ -1,9 +1,9 @@
 """Kick parts: parts V of H = T + V with {V, {V, {V, T}}} = 0, for methods of Runge–Kutta–Nyström type.
 
-The condition holds if T is like a kinetic energy: quadratic in the coordinates that the flow of V changes. Pairs of
-this kind exist not only for canonical brackets. Examples are T = p²/2 with a potential V(q) and, on se(3)*, a quadratic
-form of the angular momenta with a function of the direction of gravity. By the condition, many repeated brackets of T
-and V vanish, so a method has fewer order conditions. V also commutes with {V, {V, T}}. So V + κ{V, {V, T}} may have an
+The condition holds if T is like a kinetic energy: quadratic in the coordinates that the flow of V changes. Brackets
+need not be canonical. A canonical example is T = p²/2 with a potential V(q). An example on se(3)* is a quadratic form T
+of the angular momenta with a function V of the direction of gravity. By the condition, many repeated brackets of T and
+V vanish, so a method has fewer order conditions. V also commutes with {V, {V, T}}. So V + κ{V, {V, T}} may have an
 elementary flow as well: a kick with modified potential.
 
 The bracket is {f, g} = ∇f·π∇g. With the opposite sign, {V, {V, T}} is the same, since it contains two brackets.

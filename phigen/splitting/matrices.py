@@ -2,8 +2,8 @@
 
 The entries of A are functions of parameters; A has at most `MOST_ROWS` rows. The coefficients of a linear motion may
 also contain values that are constant along the flow but change from step to step, such as a coordinate of another part.
-Products of such values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f,
-with f as the third unknown.
+Each monomial with a value of this kind is then a further unknown: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as
+the third unknown.
 
 Matrix exponentials are computed by scaling and squaring. If ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 for
 exp(A/2^s) − 1 is F = 2(V − U)⁻¹U, where V is the even and U the odd part of its numerator. The map F ↦ 2F + F² takes

@@ -1,8 +1,8 @@
 """Kepler motions and free rigid bodies in H, and the division of H into a large and a small part.
 
 A Kepler motion is a sum of p²/2m and −k/|q| for a single body; these two terms do not commute. The body has two or
-three coordinates q, with 1/|q| in H, and their conjugate momenta p. All terms of H outside of these motions are
-perturbations. If they are small compared with the motions, H = A + εB is near-integrable.
+three coordinates q, with 1/|q| in H, and their conjugate momenta p. All terms of H that belong to no Kepler motion and
+no rigid body are perturbations. If the perturbations are small, H = A + εB is near-integrable.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term
     """Return the terms of H with each Kepler motion as a single term, first in the list. Returns None if there are no
     motions.
 
-    If ``rigid``, free rigid bodies are single terms too. A motion contains only terms of one body. So (p_1 + p_2)² is
-    not divided, and still commutes with functions of q_1 − q_2.
+    If ``rigid``, free rigid bodies are single terms too. A motion contains only terms of one body. A term with
+    coordinates of two bodies is not expanded: (p_1 + p_2)² stays one term, which commutes with functions of q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:

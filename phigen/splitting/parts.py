@@ -29,9 +29,9 @@ MAX_COMPANIONS = 3
 class SplitHamiltonian:
     """H as a sum of parts: the flows of the parts, in the order in which a step applies them.
 
-    ``kick`` is set if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`). It is then the index of the
-    part V. The Hamiltonian of the flow of this part may also contain κ{V, {V, T}}. ``small`` is set for a
-    near-integrable H = A + εB: it is the index of the part εB.
+    ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`). Then the
+    flow of this part may be that of V + κ{V, {V, T}}. ``small`` is the index of the part εB if H = A + εB is
+    near-integrable.
     """
 
     flows: tuple[Flow, ...]
@@ -42,10 +42,10 @@ class SplitHamiltonian:
 def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitHamiltonian:
     """Return H as a sum of parts with elementary flows.
 
-    The number of parts is as small as possible; among divisions with the same number, those whose parts preserve the
-    most invariants are preferred. If ``motions``, a Kepler motion is a single term; if also ``rigid``, so is a free
-    rigid body. A near-integrable H is divided into its large and its small part. Raises `SpecError` at the Hamiltonian
-    if a term has no flow; the message names the term.
+    The number of parts is as small as possible. If several divisions have this number of parts, the one that preserves
+    the most invariants is chosen. If ``motions``, a Kepler motion is a single term. If ``rigid`` is set as well, a free
+    rigid body is also a single term. A near-integrable H is divided into its large and its small part. Raises
+    `SpecError` at the Hamiltonian if a term has no flow; the message names the term.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
@@ -137,8 +137,8 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
     """Return the terms of H. If a summand has a flow as a whole, the summand is one term, and is not expanded into
     monomials.
 
-    An example on so(3) is (v·m)²: it rotates m about v, while its monomials do not commute with each other. Returns
-    None if there are no such summands.
+    An example on so(3) is (v·m)². Its flow rotates m about v, but its monomials do not commute with each other. Returns
+    None if no summand of this kind exists.
     """
     whole_terms: list[Term] = []
     remaining: list[Expression] = []

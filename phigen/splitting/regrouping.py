@@ -95,10 +95,9 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms of H with terms that couple the same blocks of π summed into one. A term couples blocks if it
-    depends on coordinates of two or more blocks.
+    """Sum the terms of H that couple the same blocks of π, and return the resulting list of terms.
 
-    Returns None if no terms are summed.
+    A term couples blocks if it depends on coordinates of two or more blocks. Returns None if no terms are summed.
     """
     block_of = {i: k for k, block in enumerate(blocks(system.coordinates, system.poisson)) for i in block}
     groups: dict[tuple[int, ...], list[Term]] = {}

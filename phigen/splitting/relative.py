@@ -113,7 +113,8 @@ class RelativeMotions:
         motion.
 
         ``spread`` converts changes of Q_i and P_i to changes of Cartesian coordinates. The first expressions vanish if
-        the linear forms Q_i and P_i convert these back. The other expressions are the identities of Kepler motions.
+        the linear forms Q_i and P_i convert the result back to the original changes. The other expressions are the
+        identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
@@ -173,10 +174,10 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield (mass, expression that replaces it in proofs). A sum M_i becomes a symbol; a mass m_i becomes the
-    difference of two such symbols.
+    """Yield pairs: a mass, and the expression that replaces the mass in proofs.
 
-    Masses that are numbers are left as they are.
+    A sum M_i becomes a symbol. A mass m_i becomes M_i − M_{i−1}, a difference of two symbols. Masses that are numbers
+    are left as they are.
     """
     previous = ZERO
     for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):

@@ -1,8 +1,8 @@
 """Motions on spheres in closed form: ẋ = (β·x)x − |x|²β for some of the coordinates x, such as double-bracket damping
 of spins.
 
-The state after the flow is the reflection of x at the line of y = x − e, where e is chosen below. The reflection is x +
-2(y(y·e)/|y|² − e), which is accurate for small e. It preserves |x| for any rounding of e.
+The flow maps x to its mirror image in the line through 0 and y = x − e, where e is given below. The mirror image is x +
+2(y(y·e)/|y|² − e). This formula is accurate for small e, and preserves |x| for any rounding of e.
 
 If β is constant, the flow is that of a Lorentz boost on the sphere: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
 
@@ -97,9 +97,10 @@ class _Sphere:
         return self._mirrored([scale * e for e in reflected])
 
     def _mirrored(self, e: Sequence[Expression]) -> list[Expression]:
-        """Return the increment 2(y(y·e)/|y|² − e) of the reflection of x at the line of y = x − e.
+        """Return 2(y(y·e)/|y|² − e) with y = x − e: the increment from x to its mirror image in the line through 0 and
+        y.
 
-        If y = 0, x moves to −x, and rounding has left no information on the direction; the increment is then −2x.
+        If y = 0, x moves to −x, and rounding has left no information on the direction. The increment is then −2x.
         """
         y = [c - d for c, d in zip(self.x, e, strict=True)]
         projection = dot(y, e) * call("inv0", dot(y, y))

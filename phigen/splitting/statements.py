@@ -84,8 +84,8 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
 
 
 def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield the statement {V, {V, {V, T}}} = 0 for H = T + V. For a modified kick, also yield that its Hamiltonian is V
-    + κ{V, {V, T}}.
+    """Yield the statement {V, {V, {V, T}}} = 0 for H = T + V. For a modified kick, also yield the statement that its
+    Hamiltonian is V + κ{V, {V, T}}.
 
     ``plain`` are the Hamiltonians of the two parts at κ = 0.
     """
