@@ -431,7 +431,8 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # The star algebra has the basis 1, [g, g], S, z. Row k of ``basis`` is the element number row_numbers[k] there.
+    # The star algebra has the basis 1, [g, g], S, z. Row k of ``basis`` is number row_numbers[k] of these basis
+    # elements.
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

@@ -22,7 +22,7 @@ Copy = tuple[int, int, int, int]
 
 def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
     """Return the copies of the quaternions whose direct sum is the algebra; () if the algebra is no direct sum of
-    these.
+    copies.
 
     The basis elements 1, i, j, k of each copy must be elements of the basis of the algebra.
     """

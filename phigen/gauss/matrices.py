@@ -49,9 +49,8 @@ def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
 def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
     """Return matrices that represent the Lie algebra by affine maps of an abelian ideal; [] if there is no such ideal.
 
-    The ideal is the radical of the Killing form. Let π be a linear map of the Lie algebra onto the ideal that is the
-    identity on the ideal. Then an element X is represented by the matrix of ad X on the ideal, with the additional
-    column π(X).
+    The ideal is the radical of the Killing form. Let P be a projection of the Lie algebra onto the ideal. Then an
+    element X is represented by the matrix of ad X on the ideal, with the additional column P(X).
     """
     m, field = lie.dimension, lie.field
     ad = [{(k, j): field.convert(c) for j in range(m) for k, c in lie.bracket(i, j).items()} for i in range(m)]
@@ -76,11 +75,10 @@ def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
 
 
 def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
-    """Return a linear projection π of the Lie algebra onto an ideal such that π([X, Y]) = X π(Y) − Y π(X) for
-    all X, Y.
+    """Return a linear projection P of the Lie algebra onto an ideal such that P([X, Y]) = X P(Y) − Y P(X) for all X, Y.
 
-    Entry k·m + i of the returned vector is the entry of the matrix π in row k and column i, where m is the dimension of
-    the Lie algebra. Returns None if there is no such π.
+    Entry k·m + i of the returned vector is the entry of the matrix P in row k and column i, where m is the dimension of
+    the Lie algebra. Returns None if there is no P with this property.
     """
     m, size, field = lie.dimension, len(ideal), lie.field
     last = size * m

@@ -107,13 +107,13 @@ class Realisation:
 
     @property
     def with_elements(self) -> Realisation:
-        """These parts without functionals: all components of the group elements are unknowns."""
+        """The realisation without functionals: all components of the group elements are unknowns."""
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
 
     @property
     def lifted(self) -> Realisation | None:
-        """These parts with frames F for all group elements; see `phigen.gauss.lift`.
+        """The realisation with frames F for all group elements; see `phigen.gauss.lift`.
 
         None if the system has no group elements, or if a group element has no frame.
         """
@@ -135,8 +135,8 @@ class Realisation:
 
 
 def direct(system: System) -> Realisation:
-    """Return the realisation in which all coordinates are unknowns; if π is constant, its step is an exact Poisson
-    map.
+    """Return the realisation in which all coordinates are unknowns. The step of this realisation is exactly a Poisson
+    map if π is constant.
     """
     constant = isinstance(system.shape, Constant | Canonical)
     return Realisation((Plain(tuple(range(system.dimension))),), constant)

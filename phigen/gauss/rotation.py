@@ -2,7 +2,8 @@
 
 A dual quaternion q + εr with ε² = 0 stands for the rotation q and the translation 2r q̄. The homomorphism maps the
 basis elements of the Lie algebra that generate rotations to ½i, ½j, ½k or, for the opposite sign of the brackets, to
-−½i, −½j, −½k. It maps generators of translations to ε times these, and all other basis elements to 0.
+−½i, −½j, −½k. It maps the basis elements that generate translations to ε times the same quaternions, and all others to
+0.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
     """Return the attitude increment of a Gauss step as a function of the unknowns: its quaternion minus 1.
 
     If the group has translations, the three components of the translation are added to the list. Returns None if the
-    coordinates that belong to rotations are in no star algebra, or if there is no homomorphism to dual quaternions.
+    coordinates that belong to rotations do not all belong to one group element, or if there is no homomorphism to dual
+    quaternions.
     """
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):

@@ -156,12 +156,12 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ of the momenta on a star algebra, and the elements f in ``frame`` of the `StarAlgebra`, both
-    divided by numbers: x̃/q and f/c.
+    """The functional x̃ on a star algebra, and elements f_k of the algebra, all divided by numbers.
 
-    The numbers are chosen such that products need few multiplications by constants. ``at_basis`` has the values of x̃/q
-    at the basis elements of the algebra, and ``frame`` has the elements f/c. The momenta x̃(E_a) are linear
-    combinations of the values of x̃/q at the f/c, with the coefficients ``combination``.
+    The f_k are the elements in the field ``frame`` of `StarAlgebra`. ``at_basis`` has the values of x̃/q at the basis
+    elements of the algebra, and ``frame`` has the elements f_k/c_k. The numbers q and c_k are chosen such that products
+    need few multiplications by constants. Let E_a be the basis of the Lie algebra. Then x̃(E_a) is the sum of
+    ``combination[a][k]`` times the value of x̃/q at f_k/c_k over all k.
     """
 
     at_basis: list[Expression]
@@ -224,9 +224,9 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
     cancellation.
 
     A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and its basis E_a of the Lie algebra. For
-    G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, an E_a outside the ideal
-    has the change u(E_a) + λ(E_a w*) instead, where the functional is λ = x̃ + u with the unknown u. With frames, the
-    change is that of the quadratic form k̃(U E_a U*).
+    G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, there is a functional λ =
+    x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. With frames, it is
+    the change of the quadratic form k̃(U E_a U*).
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
@@ -265,11 +265,10 @@ def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> l
 
 
 def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
-    """Return the momenta x̃(G f G*) of a group element G for the elements f in ``frame`` of the `StarAlgebra`, divided
-    by the numbers of `_Scaled`.
+    """Return x̃(G f_k G*)/(q c_k) for a group element G and all k, with x̃, f_k, q and c_k as in `_Scaled`.
 
-    For each basis element E_a of the Lie algebra, x̃(G E_a G*) is a linear combination of these momenta. The second
-    result has the coefficients of these combinations.
+    For each basis element E_a of the Lie algebra, x̃(G E_a G*) is a linear combination of these values. The second
+    result has the coefficients of the linear combinations.
     """
     algebra, g = group.algebra, _element_at(points, group, places)
     scaled = _scaled(group, group_values(points.system, group))
@@ -497,11 +496,11 @@ def lifted_functionals(points: StageMap) -> list[Expression]:
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
-    """Return the derivatives of the unknowns in the frame at the end of the step, where the next step starts.
+    """Return the derivatives of the unknowns as the next step needs them, where group elements start from 1 again.
 
-    ``slopes`` has the derivatives in the present frame. Those of a group element G are multiplied by G* = G⁻¹ from the
-    left. Those of functionals λ in place of an ideal are transformed accordingly. Derivatives of coordinates, time and
-    logarithms do not change.
+    ``slopes`` has the derivatives in the present step. The derivative of a group element is multiplied from the left by
+    G* = G⁻¹, where G is the group element at the end of the step. Derivatives of functionals λ are transformed by
+    `_functional_in_next_frame`. Derivatives of coordinates, time and logarithms do not change.
     """
     values = list(slopes)
     for group, places in zip(points.realisation.groups, points.places, strict=True):
@@ -524,12 +523,11 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Return the derivatives of the functional λ (`phigen.gauss.square_zero`) in the frame at the end of a
-    step.
+    """Return the derivatives of the functional λ (`phigen.gauss.square_zero`) as the next step needs them.
 
-    ``k`` has the derivatives in the present frame. The result is k(bg*) − λ(sg*) for all basis elements b of the
-    subalgebra. ``turned`` is the derivative ġ in the new frame, and s is the symmetric part of ġb. The second term
-    follows from nb + gn* = 0 at the end of a step, where G = g + n.
+    ``k`` has the derivatives in the present step, at whose end G = g + n. ``turned`` has the derivative ġ for the next
+    step. The result is k(bg*) − λ(sg*) for all basis elements b of the subalgebra, where s is the symmetric part of ġb.
+    The second term is subtracted since the functional x̃ of the next step is 0 at s.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

@@ -173,7 +173,9 @@ def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar)
 
 
 def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
-    """Return the same algebra in the basis ``vectors``, which are given by their components in the present basis."""
+    """Return ``algebra`` in the basis ``vectors``. The ``vectors`` are given by their components in the present
+    basis.
+    """
     span = Span(algebra.field, vectors)
 
     def converted(a: Mapping[int, Scalar]) -> Vector:

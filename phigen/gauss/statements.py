@@ -157,8 +157,8 @@ def _functionals(system: System, points: StageMap) -> Statement:
     """Decide whether a step is the same if functionals λ take the place of some components of group elements as
     unknowns.
 
-    For both choices of unknowns, the changes of coordinates must be equal, and the velocities too. Symbols stand for
-    ∇H, so that the statement holds for any H.
+    With functionals and without them, the changes of coordinates must be equal, and the velocities must be equal.
+    Symbols stand for ∇H, so that the statement holds for any H.
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)
@@ -230,8 +230,8 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Decide two statements on a stage whose unknowns are all 0: its state is that at the start of the step, and the
-    derivative of the state is π∇H.
+    """Decide two statements on a stage whose unknowns are all 0: the state at the stage is the state at the start of
+    the step, and its derivative is π∇H.
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]

@@ -31,8 +31,8 @@ EARLIER = 2
 
 #: Several predictors: the width of the frequency band in the unit of `BAND`, and the number of previous steps that the
 #: predictor reads. C that computes the stages of a step in SIMD lanes uses the predictor that was best in recent steps.
-#: For the Kowalevski top with steps of 0.1, 0.25, 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8,
-#: 8e-5 and 0.1. With `BAND` alone they are 3e-5, 6e-5, 3e-4 and 0.2.
+#: For the Kowalevski top with steps of 0.1, 0.25, 0.5 and 1, the errors of predicted derivatives are 3e-10, 4e-8, 8e-5
+#: and 0.1. With `BAND` as the only band, the errors are 3e-5, 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
 
 
@@ -41,8 +41,9 @@ class Precision:
     """Floating-point format to which coefficients are rounded.
 
     ``spacing`` is the distance between neighbouring numbers of the format in [1, 2]. If a < 2 is a multiple of
-    ``spacing``, then a and 1 − a are numbers of the format. The predictor ``prediction`` of `Tableau` assumes relative
-    errors ``noise`` in the values that it reads, and the predictors of `predictors` assume ``fine_noise``.
+    ``spacing``, then a and 1 − a are numbers of the format. Predictors are optimal for a certain relative error of the
+    values that they read: ``noise`` for ``prediction`` of `Tableau`, and ``fine_noise`` for the matrices of
+    `predictors`.
     """
 
     spacing: Fraction
@@ -124,8 +125,8 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
     """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
     The first columns are for the stage increments L_j of the last step. Further columns are for the preceding step, if
-    the predictor reads it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of
-    `Tableau` defines.
+    the predictor reads it. If ``integrated``, the matrices predict integrals of the offsets over time, which `Tableau`
+    explains at ``doubled``.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
