@@ -47,10 +47,11 @@ MOST_PIECES = 4
 
 @dataclass(frozen=True)
 class Turning:
-    """A part of H as a sum of functions whose flows have known group elements: ``casimir``, ``terms`` and ``bodies``.
+    """A part of H as a sum of functions whose flows have known group elements.
 
-    The element of the part is the product of these elements. If ``put_back`` is set, the rotation by the Casimir is
-    applied once in a step, not in each flow.
+    The summands are ``casimir``, a multiple of a Casimir, the ``terms``, and the energies of free rigid ``bodies``. The
+    group element of the part is the product of the group elements of its summands. If ``put_back`` is set, the rotation
+    by the Casimir is applied once in a step, not in each flow.
     """
 
     casimir: Expression
@@ -99,9 +100,9 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
 
 
 def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
-    """Return ``sin``, ``cos`` or ``versin`` of ``sign`` · ``angle``, written with sin and 1 − cos of the angle.
+    """Return ``sin``, ``cos`` or ``versin`` of ``sign`` · ``angle`` or, if ``double``, of 2 · ``sign`` · ``angle``.
 
-    ``versin`` is 1 − cos. If ``double``, the argument is twice as large.
+    The result is written with sin and 1 − cos of the angle. ``versin`` is 1 − cos.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if double:
@@ -190,8 +191,10 @@ def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expres
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
-    """Decide whether the gradient of each factor is constant along the flow of this factor and of all factors before
-    it."""
+    """Decide whether the gradients of all summands in ``turning.factors`` are constant along certain flows.
+
+    The gradient of a summand must be constant along the flows of this summand and of all summands before it.
+    """
     names, residuals = system.coordinates, list[tuple[str, Expression]]()
     fields = [hamiltonian_vector_field(system.poisson, gradient(f, names)) for f in turning.factors]
     for k, factor in enumerate(turning.factors):
@@ -206,7 +209,7 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
 def factor_elements(
     system: System, group: Group, turning: Turning, t: Expression | None = None
 ) -> list[list[Expression]]:
-    """Return the group elements, minus 1, of all factors of a part and then of its free rigid bodies.
+    """Return the group elements, minus 1, of all summands in ``turning.factors``, and then of the free rigid bodies.
 
     The group elements are functions of the state before the flow. ``t`` is the duration of the flow, by default the
     symbol of the step size. Raises `SpecError` for matrices whose exponential has no closed form.

@@ -7,8 +7,8 @@ of unit length,
 
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
-Let l, m, h be the axes with the lowest, the middle and the highest value of the integrals E_i in
-`phigen.splitting.euler`, which also defines P, R, S, C, D, κ and z. Let L = |x|, and
+Let l, m, h be the axes with the lowest, the middle and the highest value of the E_i in `phigen.splitting.euler`, which
+also defines P, R, S, C, D, κ and z. Let L = |x|, and
 
     β_l = w_h − w_m,  β_m = w_l − w_h,  β_h = w_m − w_l,  c = β_h x_m² − β_m x_h²,  n = β_m c ≤ 0,
     W = (β_l x_m² − β_m x_l²)c/L²,  T = 4κ/(1 + z),  Q = P − R.

@@ -85,8 +85,8 @@ class Group:
 def group_of(system: System, requested: str, kind: str) -> Group:
     """Return the group of attitudes of a system for the value ``requested`` of ``reconstruct``, quaternion or matrix.
 
-    ``kind`` is the kind of the bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if its algebra has no
-    such group.
+    ``kind`` is the kind of the bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if phigen knows no group
+    of this kind for its Lie algebra.
     """
     algebra = system.lie_algebra
     if algebra is None:
@@ -183,7 +183,7 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """Return the group of the matrices that represent the algebra, with the sign that belongs to its bracket.
+    """Return the group of matrices that represent the algebra. The sign of the generators is explained at `_signed`.
 
     Raises `SpecError` if no faithful matrices are known that suit the ``kind`` of the bi-realisation.
     """
