@@ -25,7 +25,11 @@ BITS = 80  # precision of interval arithmetic in bits; doubles have 53
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
 ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the C computes
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
-POINTS = (0.318309886, 0.577215665, 0.869604401)  # fractions of a box, at which derivatives are compared
+POINTS = (
+    0.318309886,
+    0.577215665,
+    0.869604401,
+)  # each number determines a point of a box, at which derivatives are compared
 LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of other functions
 # the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
@@ -121,8 +125,9 @@ def identity(n: int) -> Matrix:
 class Evaluation:
     """Evaluation of a list of operations in interval arithmetic, with bounds for the rounding error of each operation.
 
-    Each value is an interval that contains the exact and the computed result. Derivatives of each operation by its
-    operands are stored for `outputs`. ``inputs`` maps names of input operations to the intervals that they read.
+    Each value is an interval that contains the exact and the computed result. The derivatives of each operation with
+    respect to its operands are stored for `outputs`. ``inputs`` maps the name of an array to the intervals of its
+    entries; an operation with this name reads one entry.
     """
 
     def __init__(self, c: Any, operations: Any, inputs: Mapping[str, Any], exact: bool = False) -> None:
@@ -146,8 +151,9 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # The C may omit the terms a[3:] of a Taylor series, and omits all later terms. The bound contains the terms
-            # a[3:] and the first later term. The factor 3 covers all other terms, and derivatives.
+            # "rest" adds an error for the omitted terms of a Taylor series. The C may omit the terms a[3:], and omits
+            # all later terms. The error is the sum of the terms a[3:] and of the first later term, times a factor 3,
+            # which covers all other terms.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -166,8 +172,8 @@ class Evaluation:
         """Return the values of some operations, bounds for their rounding errors, and Jacobians, as matrices of
         intervals.
 
-        The error bounds use the mean value theorem. ``by`` names the inputs by which Jacobians are computed, with their
-        sizes.
+        The error bounds use the mean value theorem. ``by`` maps the name of an input array to its size; there is one
+        Jacobian with respect to each of these arrays.
         """
         errors, rows = list[Ball](), list[list[Ball]]()
         for output in indices:  # reverse-mode differentiation from this output back to all operations
@@ -184,13 +190,12 @@ class Evaluation:
 
 
 def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
-    """Return value and derivative of a function that the C computes by a polynomial, and a bound for the error.
+    """Return the value and the derivative at s of a function that the C computes by a polynomial, and an error bound.
 
-    The bound covers the error of the polynomial and rounding errors. ``series`` describes the polynomial; s is the
-    argument.
+    The bound is for the error of the value in the C, rounding errors included. ``series`` describes the polynomial.
     """
     name, beyond = series["name"], series["beyond"]
-    if beyond and mag(s) >= series["radius"]:  # such large arguments go to the function of libm
+    if beyond and mag(s) >= series["radius"]:  # for |s| ≥ radius, the C calls libm
         x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
         error = polynomial(c, {**series, "beyond": False, "inside": True}, inside)[2] if inside is not None else ZERO
@@ -217,7 +222,8 @@ def carries(c: Any, X: Iterable[Ball]) -> list[Ball]:
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
     """Evaluate the operations of a stage of the step, for all states in X, times in T and unknowns in u.
 
-    Omitted terms of Taylor series are bounded along the paths that the stage follows, unless ``exact`` is true.
+    If the stage follows paths, ``leaf["path"]`` is a box that contains the paths. On this box the omitted terms of
+    Taylor series are bounded. With ``exact``, omitted terms and rounding errors count as 0.
     """
     rests = [op[3] for op in stage["operations"] if op[0] == "rest"]
     demand("path" in stage or not rests, "a Taylor series has no path")
@@ -230,7 +236,7 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
         tail = [mag(run.x[k]) for k in path["next"]]
     inputs = {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}
     run = Evaluation(c, stage["operations"], inputs, exact)
-    if along:  # the C ends a series after two terms below rounding
+    if along:  # the C ends a series after two negligible terms in a row
         demand(bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
         hidden = [mag(run.x[a]) < run.x[b].abs_lower() / ROUNDED for a, b in stage["hidden"]]
         demand(len(hidden) == 2 * len(X) and all(hidden), "a Taylor series may end late")
@@ -238,11 +244,10 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return intervals that contain some outputs of a stage with their rounding errors, by the mean value
-    theorem.
+    """Return intervals for the outputs of a stage that ``stage[of]`` lists, rounding errors included.
 
-    The outputs are those that the stage lists under the key ``of``. The expansion is about the midpoints of X and of
-    ``box``. For small boxes the intervals are narrower than those of `run_of`.
+    The mean value theorem, applied at the midpoints of X and of ``box``, gives narrower intervals for small boxes than
+    `run_of`, whose result is ``run``. X contains the states, and ``box`` the unknowns.
     """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
@@ -267,9 +272,10 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
 
 
 def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
-    """Return change, error bound and derivative of an implicit stage. The unknowns u solve u - base + d(u) = 0.
+    """Return bounds for an implicit stage: change of the state, error, and derivative of the new state by the old one.
 
-    The C solves the equation by repeated corrections: M^-1 times the residual. A part of the change is added to the
+    The unknowns u solve u - base + d(u) = 0, where ``stage["equation"]`` is d, and base is the state or 0. The C solves
+    the equation by repeated corrections: M^-1 times the residual, with a matrix M. A part of the change is added to the
     compensation term; the fourth result is a bound for this part.
     """
     box = [interval(v) for v in leaf["u"]]
@@ -282,12 +288,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        # bound for the rounding errors of elimination, by which the C solves linear equations with the matrix
+        # bound for the rounding errors of the C when it solves linear equations with the matrix M by elimination
         pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
-    elif solves:  # the C may use finite differences in place of this matrix
+    elif solves:  # the C may compute the matrix M by finite differences
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
@@ -326,15 +332,15 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # a large term shows that the C does not end the series before it
+    if stage.get("seen"):  # the C cannot end a series before a large term
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    # Each rule that ends the iteration limits the last correction ("now"), the correction before it ("before"), or the
-    # ratio of both ("part").
+    # A rule that ends the iteration limits the last correction ("now"), the last correction but one ("before"), or the
+    # quotient of the last correction by the last but one ("part").
     for stop in stage["stops"]:
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
@@ -354,12 +360,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return bounds for the contraction rate and for the rounding noise of the corrections of an implicit stage, and a
-    factor between two norms.
+    """Return bounds for the contraction rate and the rounding errors of the corrections of an implicit stage.
 
-    The bounds are in the norm by which the C measures corrections. For a Gauss method this is the root mean square over
-    the stages of the method, and the factor is the 2-norm divided by this norm. For other methods the norm is the
-    maximum, and the factor is 1. ``factor`` has bounds for a correction in terms of the correction before it.
+    The bounds are in the norm by which the C measures corrections: for a Gauss method the root mean square over the
+    stages of the method, otherwise the maximum. The third result is the 2-norm divided by this root mean square, or 1.
+    ``factor`` is a matrix: |correction| ≤ factor · |previous correction|, apart from the rounding errors ``noise``.
+    ``low`` and ``high`` are bounds for the sizes by which corrections are divided.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]

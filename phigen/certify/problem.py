@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Functions of exact flows that certificates do not cover. Each function name maps to the motion that contains the
-#: function, in the words of error messages.
+#: Functions that certificates do not cover: name of the function → the motion whose exact flow calls the function, as
+#: error messages name it.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
@@ -93,7 +93,7 @@ def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Seq
     """Return the gauge that the solver chooses at the state ``start``, up to rounding.
 
     The gauge consists of the multiples of Casimirs that are subtracted from H. With a monitor, the result is the energy
-    level e = −H instead.
+    level instead: −H at the state ``start``.
     """
     program = compilation.program
     values = {**parameters, **dict(zip(compilation.spec.coordinates, start, strict=True))}

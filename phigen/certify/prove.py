@@ -38,15 +38,15 @@ GROWTH = 1.25
 
 #: Largest compensation term after a Gauss step, in units of 2^-53 times the largest absolute value of the coordinate.
 #: The term is the sum of two rounding errors: that of the state, at most 1 unit, and that of the change of the state,
-#: at most 2 units.
+#: at most 2 units. The rest is a margin.
 GAUSS_CARRY = 3.03
 
 #: In a Gauss step, each unknown has a bound for the distance of its iterates from the solution. All bounds are at least
 #: this fraction of the largest one, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
-#: If the C computes derivatives by difference quotients, the bound for the distance of iterates from the solution is
-#: enlarged by this fraction of each unknown. This is more than the differences of the unknowns in the quotients.
+#: The C may compute derivatives by difference quotients, at points near an iterate. Then the bound for the distance of
+#: each unknown from the solution is enlarged by this fraction of the unknown, so that it covers these points too.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.
@@ -147,8 +147,7 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """Search for a certificate, which bisects the domain until bounds are proved on each box and are at most
-    ``within``."""
+    """Search for a certificate: bisection of the domain, until the error bounds on each box are at most ``within``."""
 
     certificate: dict[str, Any]
     within: float
@@ -220,10 +219,10 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u).
+    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u); base is the state or 0.
 
-    The data are a box that contains u, and bounds for the distance of iterates from u. The box is enlarged until the
-    proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
+    The data are a box that contains u, and bounds for the distance of iterates from u. A new box is computed from the
+    last one until the proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
     """
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])
     start = run_of(c, stage, X, T, {}, base, exact=True)

@@ -75,8 +75,8 @@ class GeneratedC:
 class KernelReader:
     """The operations of one C function, in their order. A value that the C uses several times occurs once.
 
-    ``outputs`` maps each array that the function writes to the operations that compute its entries, given by index. If
-    the C computes a function by a polynomial, the constructor adds this function to ``series``.
+    ``outputs[array][i]`` is the index of the operation that computes entry i of an array. If the C computes a function
+    by a polynomial, the constructor adds this function to ``series``.
     """
 
     def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:
@@ -168,7 +168,7 @@ class KernelReader:
 class PathReader(KernelReader):
     """The operations that compute the Taylor series of a path, from the coordinates at its start.
 
-    ``outputs[f"s{i}"]`` has the indices of the coefficients of coordinate i, by order.
+    ``outputs[f"s{i}"][k]`` is the index of the operation that computes coefficient k in the series of coordinate i.
     """
 
     def __init__(self, source: GeneratedC, series: dict[str, Any], coordinates: int, orders: int) -> None:
@@ -301,8 +301,7 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Names of C functions that are read, by kind of step. The last name of a row identifies the kind: a solver has the
-#: first kind in this table whose last function is in the C.
+#: Kind of step → names of the C functions that are read. A solver has the first kind whose last function is in its C.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),

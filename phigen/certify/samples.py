@@ -19,8 +19,8 @@ from phigen.certify.checker import identity, run_of
 #: Precision in bits for the computation of the exact map.
 BITS = 300
 
-#: Largest number of corrections before the equation of a stage must be solved. Convergence is only linear, since all
-#: corrections use the same matrix.
+#: Largest number of corrections that solve the equation of a stage. Convergence is only linear, since the matrix is
+#: computed once.
 CORRECTIONS = 400
 
 #: The equation of a stage counts as solved if all corrections of the unknowns are smaller than this number.

@@ -15,8 +15,9 @@ from phigen.certify.reader import GeneratedC, PathReader
 #: term is the rounding error of one addition, which is at most 1 unit; the rest is a margin.
 CARRY = 1.01
 
-#: Least contraction rate that certificates assume. The C estimates this rate to decide when the iteration for a Gauss
-#: step ends. In runs of the example systems in ``specs`` the rate is between 0.05 and 0.5.
+#: In a Gauss step, the C estimates the contraction rate of the iteration, to decide when the iteration ends.
+#: Certificates assume that the estimate is at least this number. In runs of the systems in ``specs`` the rate is
+#: between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
 Stage = dict[str, Any]
@@ -99,10 +100,10 @@ class _Gauge(dict[int, int]):
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the operations that compute one row of coefficients, and return the indices of the coefficients. Row
-    number ``stage`` belongs to one stage or, in a splitting, to all flows of one duration.
+    """Append the operations that compute the coefficients of a stage, and return the indices of the coefficients.
 
-    The coefficients depend on parameters, step size and time.
+    The coefficients depend on parameters, step size and time. In a splitting, ``stage`` is the number of a duration;
+    all flows of this duration have the same coefficients.
     """
     step = listing.input("constant", "step")
     h = step
@@ -250,8 +251,8 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
     ]
 
 
-#: Safety factor for the sizes of terms that determine the number of terms of a Taylor series. These sizes are computed
-#: for a first box of unknowns, and the final box may be wider.
+#: The C ends a Taylor series at terms below a threshold. This is the safety factor in comparisons of terms with the
+#: threshold: the terms are computed for a first box of unknowns, and the final box may be wider.
 MARGIN = 4.0
 
 
@@ -260,7 +261,7 @@ def _path(
 ) -> list[Stage]:
     """Return the stages of a step along paths, which the C expands in Taylor series.
 
-    The unknowns are p, the mean of ∇S_h along the path, where S_h is the generating function.
+    The unknowns are p = ∇S_h at the mean of the path, where S_h is the generating function.
     """
     limit = int(facts["most_terms"])
     longest, stages = PathReader(source, facts["series"], n, limit).described, []
@@ -271,8 +272,9 @@ def _path(
 
 
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
-    """Append the Taylor series of the path ṁ = π(m)p from x with p = ``u``. Return the terms for each coordinate, from
-    order 1 on.
+    """Append the operations of the Taylor series of the path ṁ = π(m)p that starts at x, with p = ``u``.
+
+    Return the indices of the terms of order 1, 2, … for each coordinate.
     """
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
     outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
