@@ -16,8 +16,8 @@ sl(n)            H_i = E_ii − E_{i+1,i+1}, then E_ij with i < j, then E_ij wit
 gl(n)            E_11, E_12, …, row by row
 su(2)            −iσ_1/2, −iσ_2/2, −iσ_3/2 with [e_1, e_2] = e_3 and cyclic
 su(n), n > 2     E_ij − E_ji (i < j), i(E_ij + E_ji) (i < j), i(E_kk − E_{k+1,k+1}); as real 2n×2n matrices
-sp(2n)           matrices (A B; C −Aᵀ), B and C symmetric: A = E_ij row by row, then B, then C = E_ij + E_ji
-                 (i < j) or E_ii, in the order 11, 12, …, 22, …
+sp(2n)           matrices (A B; C −Aᵀ), B and C symmetric: first those with A = E_ij, row by row; then those with
+                 B = E_ij + E_ji (i < j) or B = E_ii, in the order 11, 12, …, 22, …; then the same for C
 heisenberg(n)    q_1 … q_n, p_1 … p_n, z with [q_i, p_i] = z
 aff(1)           a, b with [a, b] = b; aff(n) is gl(n), then the translations of Rⁿ
 ================ ============================================================================================

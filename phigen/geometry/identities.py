@@ -20,7 +20,8 @@ DEGREE = 2
 #: Each pair (a, b) stands for the point (a, a + b, a + 2b, …). The function is expanded in a Taylor polynomial at the
 #: first of these points where this is possible. Many functions have rational values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Largest number of lines that are tried. The search ends at the first line on which the function has values.
+#: An expression is evaluated at points of a line, to exclude functions that are not polynomials. If it has no value at
+#: one of the points, another line is tried; this is the largest number of lines.
 _LINES = 8
 
 

@@ -119,7 +119,7 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
 
 
 def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
-    """Return a vector over Q after multiplying it by the number that makes its entries coprime integers.
+    """Return the multiple of a vector over Q whose entries are coprime integers.
 
     The entry with the smallest key is positive.
     """

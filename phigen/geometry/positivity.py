@@ -12,7 +12,7 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
 
-#: Signs that all real values of an expression may have because of its form.
+#: The two statements that the form of an expression can prove about the sign of its values.
 POSITIVE, NOT_NEGATIVE = "positive", "not negative"
 _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
 
@@ -94,7 +94,7 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
                 return args[0] or NOT_NEGATIVE
             return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
         if e.op == "pow":
-            # A power with an even denominator has a value only for arguments ≥ 0; this value is not negative.
+            # If the denominator of the exponent is even, the power is defined only for bases ≥ 0, and is not negative.
             exponent = Fraction(e.value)
             is_even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
             sign = args[0] or (NOT_NEGATIVE if is_even else None)

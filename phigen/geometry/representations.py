@@ -110,9 +110,9 @@ def _with_characters(
     """Yield the adjoint representation, extended by 2×2 blocks (0 χ; 0 0) that make it faithful on the centre.
 
     There is one block for each dimension of the centre. χ is a linear form that vanishes on [g, g], where g is the
-    algebra. If there are fewer linear forms of this kind than dimensions, nothing is yielded. The Cayley transform
-    contains products P E_i P of a basis element E_i and P = Σ p_k E_k. These blocks are nilpotent, and add nothing to
-    the products. Diagonal blocks would add cubic terms.
+    algebra. If there are too few linear forms that vanish on [g, g], nothing is yielded. Nilpotent blocks add nothing
+    to the products P E_i P in the Cayley transform, where E_i is a basis element and P = Σ p_k E_k. Diagonal blocks
+    would add cubic terms.
     """
     derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
     forms: list[dict[int, Scalar]] = []

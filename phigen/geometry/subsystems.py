@@ -34,9 +34,9 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 
 
 def block_of(system: System, indices: Sequence[int]) -> System:
-    """Return a system with H = 0 for a block of π; ``indices`` are those of the coordinates of the block.
+    """Return a system with H = 0 for a block of π; ``indices`` are the numbers of its coordinates, from 0.
 
-    The system has the form of π that the spec states for this block or, if there is none, the matrix of the block.
+    The π of the new system has the form that the spec states for the block. If the spec states none, π is a matrix.
     """
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):

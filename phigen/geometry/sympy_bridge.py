@@ -97,8 +97,7 @@ def _rational(e: Any) -> Fraction:
 
 
 def named_function(order: int, s: Any) -> Any:
-    """Return the derivative of φ(s) of this ``order`` as a function symbol with primes, for display in
-    formulas.
+    """Return φ, φ′ or φ″ at s as a function symbol, for display in formulas; ``order`` is the number of primes.
 
     φ is the function of `phigen.symbolic.special`.
     """
@@ -106,15 +105,15 @@ def named_function(order: int, s: Any) -> Any:
 
 
 def closed_function(order: int, s: Any) -> Any:
-    """Return the derivative of this ``order`` of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
+    """Return φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form, or its derivative of order ``order``."""
     u = sympy.Dummy("u")
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
 def expanded_function(order: int, s: Any, degree: int) -> Any:
-    """Return the derivative of this ``order`` of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s.
+    """Return the power series of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!, or of a derivative of φ, up to a ``degree`` in s.
 
-    The polynomial has the terms of the power series up to ``degree``.
+    ``order`` is the order of the derivative. The B_k are Bernoulli numbers.
     """
     u = sympy.Dummy("u")
     terms = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))

@@ -38,8 +38,8 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     for m in range(1, representation.size + 1):
         if m > 2 and m % 2:
             powers.append(_times(tower, powers[-1], element))
-        # tr X^m is computed from two powers of X, each with about half of the exponent m. These have far fewer terms
-        # than X^(m-1).
+        # tr X^m is the trace of a product of two powers of X with exponents near m/2. Entries of these powers have far
+        # fewer terms than entries of X^(m-1).
         pairs = [(powers[m // 2][i][j], powers[m - m // 2][j][i]) for i in n for j in n]
         if sum(len(a) * len(b) for a, b in pairs) > _MOST_PRODUCTS:
             return
@@ -69,8 +69,8 @@ def _dual_element(
 ) -> list[list[Poly]]:
     rows = [[tower.zero for _ in range(size)] for _ in range(size)]
     for i, name in enumerate(coordinates):
-        # The rows of the trace form span the space. In terms of these rows, unit vector i has the coordinates in row i
-        # of the inverse of the form.
+        # ``span`` has the rows of the trace form. The coefficients of unit vector i in terms of these rows are row i of
+        # the inverse matrix of the form.
         for j, c in (span.coordinates({i: field.one}) or {}).items():
             for (r, column), v in matrices[j].items():
                 rows[r][column] = rows[r][column] + tower.variable(name) * (c * v)
