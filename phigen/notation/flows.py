@@ -61,10 +61,10 @@ def _place(matrix: MatrixExponential, k: int) -> str:
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """Return the generator of a flow as pairs (name, expression).
+    """Return the Hamiltonian or the force whose flow this is, as pairs (name, expression).
 
-    If the generator is a Hamiltonian, there is one pair, with the name "". If it is a force, there is a pair for each
-    nonzero component, with the name of its coordinate.
+    For a Hamiltonian there is one pair, with the name "". For a force there is a pair for each nonzero component, with
+    the name of its coordinate.
     """
     if not flow.force:
         return [("", flow.hamiltonian)]
@@ -74,8 +74,8 @@ def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expre
 def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tuple[str, str]]:
     """Return pairs of a name and a text: the parts of H, and for each flow the coordinates after the time h.
 
-    In long formulas, repeated subexpressions are called σ_1, σ_2, …; their definitions follow the formulas. The
-    matrices of exponentials come last.
+    Long formulas contain symbols σ_1, σ_2, … for repeated subexpressions; the definitions of these symbols follow the
+    formulas of the flow. After all flows, the matrices of exponentials are listed.
     """
     equations: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):

@@ -19,7 +19,7 @@ Equation = tuple[str, Sequence[str]]
 
 _PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
 _DOTS = f"{_PLUS}<mo>…</mo>"
-#: LaTeX of the function φ of the exponential bi-realisation, and of the map β of a symmetric bi-realisation.
+#: Equations in LaTeX: φ(s), which occurs in the exponential bi-realisation, and β(x, p) = α(x, −p).
 _PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
 _BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
 #: Width of an equals sign, and width of the space between two columns of a matrix, in em.

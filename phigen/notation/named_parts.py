@@ -41,7 +41,8 @@ class Readable:
 def readable(expressions: Sequence[Expression]) -> Readable:
     """Return expressions in a form for display: multiplied out, unchanged, or with names for common subexpressions.
 
-    All expressions share the names. Names are given only to long expressions, or where they save much of the length.
+    All expressions share the names. Expressions that are long in every other form contain names. All expressions
+    contain names if this makes the formulas much shorter.
     """
     unnamed_form, named_form = _partly_named(expressions), _all_named(expressions)
     return (

@@ -16,11 +16,11 @@ from xml.etree.ElementTree import Element
 LINE = 31.0
 #: Indentation of continued lines in LaTeX, and its width in em.
 INDENT, INDENTED = "\\quad ", 1.0
-#: Fraction of a line that may stay empty if a break there avoids a break inside one more pair of parentheses.
+#: A break inside parentheses is as bad as an empty part of the line: this fraction of the line for each pair of
+#: parentheses around the break.
 _SHORTER = 0.35
-#: A line is broken before a sign +, − or =, or between two factors. A break before a sign is worse, the more pairs of
-#: parentheses enclose the sign. A break between factors counts like one before a sign that this number of further pairs
-#: encloses.
+#: A break between two factors is as bad as a break before a sign with this number of additional pairs of parentheses
+#: around it.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
