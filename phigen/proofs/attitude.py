@@ -2,9 +2,9 @@
 
 g₀ and g₁ are the attitudes before and after a step, as group elements, and τ is the attitude increment. If x is the
 momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the momentum in space,
-g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x conserves the momentum
-as well, so a second statement is needed, on the rate of rotation: for h → 0 it must be ∇H, where H includes the
-Casimirs that were subtracted from it for the step.
+g₁ = τ g₀, and the momentum in the body is constant. This does not determine τ: a product of τ and a rotation that fixes
+x also conserves the momentum. So a second statement says that the rate of rotation tends to ∇H for h → 0. Here H is the
+Hamiltonian of the spec, from which no Casimirs are subtracted.
 """
 
 from __future__ import annotations
@@ -202,10 +202,9 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression: the rates of the coordinates of free rigid bodies.
+    """Yield the rates of the coordinates of free rigid bodies in the flows of other terms, as pairs (label, rate).
 
-    The bodies belong to a part of H; the rates are those in the flows of the other terms of the part. If all
-    expressions vanish, these flows do not move the bodies.
+    The bodies and the terms belong to one part of H. All rates are 0 if the flows of the terms do not move the bodies.
     """
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
@@ -217,7 +216,7 @@ def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]
     """Yield the residuals of α_i = ±(w_k − w_j) for free rigid bodies, for cyclic (i, j, k).
 
     The w_i are the second derivatives of H (inverse moments of inertia). The α_i are factors in the attitude increment
-    of the body.
+    of the body. The sign is + if the coordinates are the momentum in the body, and − for the momentum in space.
     """
     for body in turning.bodies:
         w = [derivative(derivative(body.hamiltonian, c), c) for c in body.coordinates]
@@ -357,12 +356,12 @@ def element_statements(
 def _residuals(
     group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
 ) -> Iterator[tuple[str, Expression]]:
-    """Yield residuals that are 0 if a step conserves the momentum.
+    """Yield the changes of conserved vectors in a step, with labels. They are 0 if the step conserves the momentum.
 
-    A residual is a vector after the step minus the same vector before the step, both in the frame in which the vector
-    is constant. The vectors are those that rotate with the body, or the momentum if the group has no such vectors. Let
-    g₀ be the quaternion of the attitude before the step, and τ that of the attitude increment. Residuals are multiplied
-    by |g₀|²|τ|². For se(3), those of the angular momentum are computed for g₀ = 1 and multiplied by |τ|⁴.
+    The vectors are ``group.vectors`` or, if there are none, the momentum. The attitude rotates each vector to
+    coordinates in which it is constant. Let g₀ be the quaternion of the attitude before the step, and τ that of the
+    attitude increment. Changes are multiplied by |g₀|²|τ|². For se(3), the change of the angular momentum is computed
+    for g₀ = 1 and multiplied by |τ|⁴.
     """
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
@@ -419,7 +418,7 @@ def _any(s: Expression) -> Expression:
 
 
 def _quarter(s: Expression) -> Expression:
-    """Return φ(s/4) as a function of c = 1 − φ(s/4)s/4, where c is a free symbol."""
+    """Return φ(s) = (1 − c)/s, where the free symbol c stands for 1 − sφ(s). In the proofs, s is |p|²/4."""
     return (ONE - symbol(Symbol("cosine"))) / s
 
 

@@ -22,7 +22,7 @@ from phigen.proofs.statements import (
 from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
-#: Names of the groups that are not examined if π is not a Poisson tensor, since their statements depend on it.
+#: Names of the groups that are not examined if π is not a Poisson tensor. Their statements presuppose a Poisson tensor.
 UNEXAMINED = "Casimirs, invariants, the method"
 
 #: The key of a spec to which the statements of a group refer, by the name of the group.

@@ -1,5 +1,4 @@
-"""Comparison of two derivations of a method, term by term: that of the compiler, and `phigen.series.reference` by
-sympy."""
+"""Comparison of two derivations of the S_i, α and β: by the compiler, and by sympy in `phigen.series.reference`."""
 
 from __future__ import annotations
 
@@ -301,9 +300,9 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
 
 
 def _differing_point(pair: Sequence[Any], positive: Collection[str]) -> str | int:
-    """Return a text with a point where both expressions differ, and their values there.
+    """Return a text with a point where the two expressions of a pair differ, and their values at this point.
 
-    If none is found, return the number of points where they agree.
+    If no point is found, return the number of points at which the expressions agree.
     """
     symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
     values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
