@@ -64,9 +64,9 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return a bi-realisation of a π with none of the simpler shapes: the first one in a list that applies.
 
-    The list is: the bi-realisation ``gauged``, if π is constant in other coordinates, each a function of one
-    coordinate; a bi-realisation in the coordinates in which the spec states π; a bi-realisation for each block of
-    π; Karasev's construction.
+    The list is: the bi-realisation ``gauged``, if π is constant in coordinates y_i that are functions of x_i only; a
+    bi-realisation in the coordinates in which the spec states π; a bi-realisation for each block of π; Karasev's
+    construction.
     """
     for kind in (_gauged, _pulled_back, _by_blocks):
         candidate = _applicable(kind, system, choice)

@@ -81,7 +81,7 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
 def moved(
     system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
 ) -> tuple[Expression, ...]:
-    """Return the map ψ⁻¹ ∘ map ∘ T*ψ⁻¹ in the coordinates x, for a map α or β in the coordinates y = ψ(x)."""
+    """Return α or β in the coordinates x, from its components ``maps`` in the coordinates y = ψ(x)."""
     p = covector_symbols(system.coordinates)
     covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
     substitution = dict(zip(form.coordinates, change.forward, strict=True))

@@ -36,8 +36,7 @@ def is_large(system: System, realisation: BiRealisation) -> bool:
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
-    # Estimated number of products: each term of each α_i is multiplied by the derivatives of each α_j with respect to
-    # x_k and p_k, for n values of k.
+    # The result compares a rough number of products of terms in all brackets with a limit; a node counts as a term.
     sizes = sum(len(topological([e])) for e in realisation.alpha)
     return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
 
