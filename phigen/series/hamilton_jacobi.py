@@ -4,8 +4,9 @@ S_t solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0, hence S_1 = H and
 
     (i+1) S_{i+1}(x) = coefficient of t^i in H(α(x, ∇(S_1 t + … + S_i t^i))).
 
-The S_i of the paper (docs/mathematics.md cites it) have an additional factor i!. A bi-realisation is symmetric if
-β(x, p) = α(x, −p). Then every S_i of even index vanishes. The recursion relies on this; `residual` can prove it.
+The S_i of the paper (docs/mathematics.md cites it) have an additional factor i!. In a symmetric bi-realisation,
+β(x, p) = α(x, −p) and every S_i of even index is 0. The recursion does not compute these S_i. The result can be proved
+by `residual`.
 
 If H depends on a time τ, then τ and its conjugate variable e, with {τ, e} = 1, are added to the coordinates. The
 bi-realisation of τ and e is the midpoint rule, and H(τ, x) is replaced by H(τ, x) + e. The generating function is then

@@ -39,8 +39,8 @@ Source = Callable[[int], Sequence[Coefficients]]
 def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], times: Sequence[Any] = ()) -> Iterator[Any]:
     """Yield S_1, S_2, … without end, as sympy expressions in x and the parameters.
 
-    ``source`` returns the Taylor coefficients a_μ of α in p; `closed_form` and `phigen.series.reference_paths` make
-    such functions. ``times`` has the symbol of the time, if H depends on it.
+    ``source`` returns the coefficients a_μ of the Taylor series of α in p. It is the result of `closed_form` or of
+    `phigen.series.reference_paths.source_of_paths`. ``times`` has the symbol of the time, if H depends on it.
     """
     terms: list[Any] = []
     while True:
@@ -50,7 +50,7 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
-    """Return a `Source`: the function that maps a degree to the Taylor coefficients a_μ in p of ``alpha``.
+    """Return a `Source` for the map ``alpha``, which is given in closed form.
 
     The components of ``alpha`` are expressions in x and p. They must be defined at p = 0 as they are written: they may
     contain no quotient such as sin(p)/p.
@@ -125,7 +125,7 @@ def _coefficient(
 class Series:
     """Power series u_1(t), …, u_n(t) without constant term, with coefficients in the ring ``functions``.
 
-    ``coefficient(k, j)`` returns the coefficient of t^j in the series number k, from 0.
+    ``coefficient(k, j)`` returns the coefficient of t^j in series number k; numbers count from 0.
     """
 
     def __init__(self, functions: Functions, coefficient: Callable[[int, int], Any]) -> None:

@@ -78,9 +78,9 @@ class _Parts:
         return self.functions.total(terms)
 
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
-        """Return the part of degree ``degree`` in p of component ``f`` of (α, β).
+        """Return the terms of degree ``degree`` in p of component ``f`` of (α, β).
 
-        With ``c``, return the part of this degree of the derivative of the component with respect to x_c.
+        With ``c``, the component is first differentiated with respect to x_c.
         """
         key = (f, degree, c)
         if key not in self._known:
@@ -95,7 +95,5 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Return the derivative with respect to p_c of a part of component ``f`` of (α, β): the part of degree
-        ``degree`` in p.
-        """
+        """Differentiate the terms of degree ``degree`` in p of component ``f`` of (α, β) with respect to p_c."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

@@ -64,11 +64,7 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """Return a `Source`: a function that maps a degree to the Taylor coefficients in p of one endpoint of a
-    path.
-
-    The ``time`` 0 selects the start α = m(0), and 1 the end β = m(1).
-    """
+    """Return a `Source` for α, the start m(0) of the path (``time`` 0), or for β, its end m(1) (``time`` 1)."""
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)
     parts: list[list[Any]] = []
