@@ -14,10 +14,10 @@ EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site; the sum is a part of the gradient.
 #: The symbols of the other kinds have the value 1 or 0. PRESENT: 0 if a term reads a site beyond an open end, else 1.
-#: CHOSEN: 1 if a site of a graph has the colour whose flow is applied. BEGINS: weight of some terms in the equation of
-#: motion of a site, namely the terms of H that are written at a neighbour and read the site. The weight is 1 if these
-#: terms belong to the part of H whose flow is applied. The key is the colour of that part and the offset of the
-#: neighbour. The weight depends on the position of the sites relative to boundary seams.
+#: CHOSEN: 1 if a site of a graph has the colour whose flow is applied. BEGINS: 1 if the terms of H that begin at a
+#: neighbour belong to the part of H whose flow is applied. In the equation of motion of a site, the symbol is a factor
+#: of the contribution of these terms. The key is the colour of the part and the offset of the neighbour. The value
+#: depends on the position of the site relative to boundary seams.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
 #: Kinds of inputs of transposed functions of lattices. AROUND: cotangent of the change of a field at a neighbour; the
 #: key is the number of the field and the offset. HERE and THERE: cotangents of a sum over bonds or pairs, at the site
