@@ -2,7 +2,7 @@
 
 from phigen import interrupts
 
-interrupts.obey()  # Called before the imports: they take time, and Ctrl-C shall end the process during them too.
+interrupts.obey()  # Called before the imports, which take time: Ctrl-C must end the process during the imports too.
 
 
 def main() -> None:

@@ -103,10 +103,10 @@ def compile(
     else NumPy with a `PhigenWarning`. With ``opencl`` and ``cuda``, ensembles and lattices run on a device, see
     `Solver.device`; the argument ``device`` is the number of the device to use.
 
-    ``order`` overrides the order of the spec, and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its
-    scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`; parts
-    that the spec requests are always included. ``profile`` is the profile of the code, ``fast`` by default; the profile
-    in a spec only applies to ``phigen build``.
+    ``order`` and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) override the settings of the spec.
+    ``tangent`` adds the method `Solver.step_tangent` to the solver. ``adjoint`` adds `Solver.pullback` and
+    `Solver.jacobian`. A method that the spec requests is always included. ``profile`` is the profile of the code,
+    ``fast`` by default; the profile in a spec only applies to ``phigen build``.
 
     Compiled C is stored in a cache, under a hash of its content. Returns a `Solver`, or a `LatticeSolver` for a
     lattice. Raises `SpecError` and `LimitError`. Raises `CheckError` if a statement is refuted, for instance if π is
@@ -128,11 +128,11 @@ def expect_runnable(target: str) -> None:
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas of the method that `compile` uses, in sympy: the maps α and β, the terms S_1 … S_k, and the
-    discretised Hamiltonian.
+    """Return formulas of the method that `compile` uses, in sympy.
 
-    ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`. Also raises
-    `SpecError` for a splitting, which has none of these formulas.
+    The formulas are the maps α and β of the bi-realisation, the terms S_1 … S_k of the generating function, and H minus
+    the multiples of Casimirs. ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of
+    `compile`. Also raises `SpecError` for a splitting and for Gauss collocation, which have no bi-realisation.
     """
     from phigen.notation.sympy_formulas import sympy_formulas
 
@@ -142,10 +142,10 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
 
 def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
-    """Return the compilation of a source: the method and the program. The statements about them are proved.
+    """Return the compilation of a source. The statements about the system and the method are proved.
 
-    The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is ``fast``, unless the options
-    name another one or the source is a compilation with another one. Raises the errors of `compile`.
+    The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is that of the options, else
+    that of a source that is a compilation, else ``fast``. Raises the errors of `compile`.
     """
     _expect_valid(**options)
     if isinstance(source, Compilation):
@@ -208,8 +208,8 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
     """Return the files (name → text) that Python loads for a target.
 
-    If the target is a device, there is code for the device, and code in C or NumPy for computations that do not run on
-    devices.
+    For a device, the files contain code for the device, and code in C or NumPy for the computations that run on the
+    processor.
     """
     if target not in registry.DEVICES:
         return emit(program, target, command)

@@ -2,8 +2,9 @@
 CompiledLattice``.
 
 All four classes have the members of `_Compiled` and a property ``system``; for a lattice of any size, this property
-raises `SpecError`. Each of the methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` is for one class: there
-it returns the compilation, with the type of this class, and for other classes it raises `ValueError`.
+raises `SpecError`. The methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return the compilation itself,
+with the type of one class: `by_gauss`, for instance, with the type `CompiledGauss`. A compilation of another class
+raises `ValueError` instead.
 """
 
 from __future__ import annotations

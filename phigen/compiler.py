@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: A series of high order takes long to build. Its cost is estimated from the series of this order: the number of
-#: operations of the shorter series is a lower bound.
+#: Order of the series whose number of operations is counted, as a lower bound for series of higher orders, which take
+#: long to build.
 PREVIEW_ORDER = 4
 
-#: Least number of sites of a lattice that is recognised if a spec writes out the equations of all its sites. Specs with
-#: fewer coordinates than this are not examined.
+#: A spec may write out the equations of a lattice site by site. phigen recognises lattices with at least this number of
+#: sites.
 LEAST_LATTICE_SITES = 8
 
 
@@ -287,8 +287,8 @@ def _candidates(spec: Spec) -> tuple[str, ...]:
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
-    """Return the reason for choosing the scheme ``best``: the expected times of the other schemes, relative to
-    ``best``.
+    """Return the reason for choosing the scheme ``best``: the expected times with other schemes, as multiples of the
+    time with ``best``.
     """
     least = _expected(compilations[best])
     if least == 0:
@@ -442,9 +442,7 @@ def _group(spec: Spec, source: System, kind: str) -> Group | None:
 
 @contextmanager
 def bounded(spec: Spec) -> Iterator[None]:
-    """Context that turns the `OverflowError` of polynomials that do not fit into memory into a `LimitError` about the
-    spec.
-    """
+    """Context that raises `LimitError`, with a place in the spec, if a polynomial does not fit into memory."""
     try:
         yield
     except OverflowError as error:

@@ -1,8 +1,8 @@
 """Registry of the functions that make formulas, tables and figures of systems, compilations and trajectories.
 
 `phigen.notation` and `phigen.drawing` import the classes of systems and trajectories, so these classes cannot import
-notation and drawing. These classes call `display` with a name instead; the module of that name is imported on its first
-use.
+notation and drawing. Instead, these classes call `display` with a name in `DISPLAYS`. The function `display` imports
+the module that this table lists for the name.
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ DISPLAYS = {
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return the function with this name in `DISPLAYS`. The function makes formulas, a table or a figure of an
-    object.
+    """Return the function for ``name`` in `DISPLAYS`, which makes formulas, a table or a figure of an object.
 
-    The function raises `MissingPackageError` if a package that it needs is missing.
+    The returned function raises `MissingPackageError` if a package that it needs is missing.
     """
     module, function = DISPLAYS[name]
     return cast(Callable[..., Any], getattr(import_module(module), function))

@@ -36,9 +36,10 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: STRETCH is the number of steps between two checks that all values are finite. If a step fails when it is made alone,
-#: this step and the following ones, FAR_STEPS in all, use functions that are valid for all arguments. The numbers are
-#: those of templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
+#: STRETCH is the number of steps between two checks that all values are finite. If a check fails, the steps are
+#: repeated one by one. From the first step that fails again, FAR_STEPS steps use functions that are valid for all
+#: arguments. The numbers are those of templates/c/runtime/lattice.c, so that runs on one and on several processes are
+#: bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
 #: Arguments of `LatticeSolver.integrate` that are refused on several processes. They need parts of steps, or copies of
