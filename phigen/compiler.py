@@ -350,8 +350,8 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """Return H as a sum of parts, each with its flow.
 
     With the key ``coordinates_from``, there is one part for each body. Otherwise some parts may be known motions, such
-    as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. Known motions are not used
-    with a monitor. They are not used either if the spec names a composition and the whole of H is one known motion.
+    as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. There are no known motions if
+    the spec has a monitor. There are none if the spec names a composition and the whole of H is one known motion.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
@@ -365,7 +365,7 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 def _turns_bodies(spec: Spec, system: System) -> bool:
     """Whether free rigid bodies may be parts of H.
 
-    They may not be parts if the spec reconstructs an attitude other than that of a rigid body.
+    This is excluded if the spec reconstructs an attitude as a matrix that is not a rotation in space.
     """
     group = _group(spec, system, "exponential")
     if group is None:

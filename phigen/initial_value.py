@@ -93,8 +93,8 @@ def solve_ivp(
 
     ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h``; with a
     monitor, which rescales time by dt = g dτ, ``h`` is a step in τ. Without ``h``, the step is halved until the last
-    state changes by less than atol + rtol |y|. States between steps (at ``t_eval``, at ``events``, of ``sol``) are
-    computed by further steps rather than by interpolation, so they have the Casimirs of the trajectory.
+    state changes by less than atol + rtol |y|. States between steps, for ``t_eval``, ``events`` and ``sol``, are made
+    by further steps rather than by interpolation, so they have the Casimirs of the trajectory.
 
     ``status`` is −1 if a step fails, or if the tolerances are not reached, as for chaotic motion over a long time.
     Raises `TypeError` for systems with noise, since steps of different sizes do not follow one path of the noise.
@@ -193,10 +193,9 @@ class _Problem:
         return 2 * h, False
 
     def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Return the times and states of each event, and the time of the first terminal event, or None without
-        one.
+        """Return the times and states of each event, and the time at which a terminal event ends the integration.
 
-        The integration ends at the first terminal event, so later events are left out.
+        Events after this time are left out. The second result is None if no terminal event occurs.
         """
         by_event = [self._crossings(event, h) for event in event_list]
         sign, stops = math.copysign(1.0, self.end - self.begin), []

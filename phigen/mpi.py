@@ -251,7 +251,7 @@ class _Domain:
         return first, end
 
     def _neighbours(self) -> list[int | None]:
-        """Return the ranks of the processes that have the planes before and after those of this process.
+        """Return the ranks of two processes: the one with the planes before this process's planes, and the one after.
 
         A rank is None if the planes of this process end at an open end of the lattice.
         """
@@ -334,7 +334,7 @@ class _Domain:
         return True
 
     def _apply_last_flow(self) -> None:
-        """Apply the last flow of the last step, if it is still missing. ``saved`` stays the state without this flow."""
+        """Apply the last flow of the last step, if it is still missing. The attribute ``saved`` does not change."""
         if not self.open:
             return
         self._set_solver_time(self.steps - 1)

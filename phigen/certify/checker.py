@@ -1,6 +1,9 @@
 """Checker of certificates: a script that needs python-flint, but nothing of phigen.
 
 Usage: python checker.py NAME.bounds.json NAME.c. Numbers with uncertainty are balls (midpoint and radius) of flint.
+
+In arguments, c is the certificate. X and T are intervals for the state and the time. ``leaf`` contains the boxes and
+bounds that the certificate has for X and T. u and ``box`` are intervals for the unknowns of a stage.
 """
 
 from __future__ import annotations

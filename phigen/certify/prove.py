@@ -1,4 +1,7 @@
-"""Search for a certificate: division of the domain into boxes, and boxes that contain the unknowns of the step."""
+"""Search for a certificate: division of the domain into boxes, and boxes that contain the unknowns of the step.
+
+The argument c of functions is the result of `described`, a certificate without boxes and bounds.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +35,8 @@ from phigen.certify.stages import CARRY, stages_of
 #: Largest number of attempts to find a box that provably contains the unknowns of an implicit step.
 PASSES = 8
 
-#: Factor between the box of unknowns and its estimate. A smaller factor needs more attempts; with a larger factor it is
-#: harder to prove that the iteration contracts.
+#: Factor by which the box of unknowns is wider than its estimate. A smaller factor needs more attempts; with a larger
+#: factor it is harder to prove that the iteration contracts.
 GROWTH = 1.25
 
 #: Largest compensation term after a Gauss step, in units of 2^-53 times the largest absolute value of the coordinate.

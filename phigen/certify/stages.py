@@ -1,4 +1,8 @@
-"""The stages of a certified step as lists of operations, which are built from functions and tables of the C."""
+"""The stages of a certified step as lists of operations, which are built from functions and tables of the C.
+
+In arguments, ``facts`` is the result of `phigen.certify.reader.read`, n the number of coordinates, and k the number of
+a stage.
+"""
 
 from __future__ import annotations
 

@@ -151,10 +151,9 @@ def _temperature(
     """Return a temperature T for which the density exp(−H/T) may be stationary, or None if no sample point
     gives one.
 
-    The density can be stationary only if the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0. T is the solution of
-    this equation at one sample point. ``slope`` is ∇H. ``diffusive_rate`` is πζ + f, the vector field of the forces.
-    ``spread`` is Σ σ²(XH)X, a sum over the sources of noise, where σ is the amplitude and X the vector field of a
-    source.
+    If the density is stationary, then ∇H·(2T(πζ + f) + Σ σ²(XH)X) = 0. T solves this equation at one sample point.
+    ``slope`` is ∇H. ``diffusive_rate`` is πζ + f, the vector field of the forces. ``spread`` is Σ σ²(XH)X, the sum over
+    the sources of noise, each with an amplitude σ and a vector field X.
     """
     loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))

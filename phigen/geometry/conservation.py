@@ -96,10 +96,10 @@ def moving(system: System) -> list[str]:
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """Return the unit of a quantity whose ``value`` and size of ``terms`` at the start of a trajectory are
-    given.
+    """Return the unit of a quantity with this ``value`` at the start of a trajectory, and with terms of this size.
 
-    If the value is nearly 0, the unit has the ``kind``, `TERMS` or `SITES`.
+    If the value is small compared with ``terms``, errors are relative to ``terms``; ``kind`` is then the kind of the
+    unit, `TERMS` or `SITES`.
     """
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
@@ -111,7 +111,7 @@ def value_and_terms(
 ) -> tuple[Floats, Floats]:
     """Return the values of a quantity Q and the sizes Σ |x_i ∂_i Q| of its terms.
 
-    The ``values`` of the symbols are those at one state, or arrays of those at each state of a trajectory.
+    ``values`` maps each symbol to its value at one state, or to an array of its values along a trajectory.
     """
     value, *slopes = evaluate([quantity, *gradient(quantity, coordinates)], values)
     with np.errstate(all="ignore"):

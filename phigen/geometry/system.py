@@ -270,7 +270,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
 
 
 def _with_place(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
-    """Return the error with locations for all diagnostics: those without one are located at the section ``poisson``."""
+    """Return the error; diagnostics without a location get the location of the section ``poisson``."""
     place = locations.get(("poisson",))
     return SpecError(
         [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]

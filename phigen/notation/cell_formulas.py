@@ -91,8 +91,8 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
     """Return the equations of motion at a site of a grid, as tuples of left side (a text) and right side.
 
-    For a lattice without axes (a graph, or pairs of sites), the derivatives ∂h/∂x of densities h of H are returned
-    instead: first those of the density at a site, then those of the density of a bond or pair.
+    A lattice without axes (a graph, or pairs of sites) has densities h of H for a site and for a bond or pair. For this
+    lattice the derivatives ∂h/∂x are returned instead.
     """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]

@@ -1,8 +1,8 @@
 """Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
 
-Widths are upper estimates in em for the fonts of TeX. A line breaks before a plus or minus sign outside parentheses if
-this leaves no large gap at its end, else before a sign inside parentheses. It breaks between factors only if there is
-no sign at which it can break.
+Widths are upper estimates in em for the fonts of TeX. A line breaks before a plus or minus sign outside parentheses. If
+this would leave a large gap at the end of the line, the line breaks before a sign inside parentheses. If there is no
+sign, the line breaks between factors.
 """
 
 from __future__ import annotations

@@ -66,9 +66,7 @@ def check(compilation: Compilation) -> Iterator[Statement]:
 
 
 def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
-    """Yield the statements for a step from the series S_1, S_2, …: those on the attitude increment, and one on its rate
-    ∇S_1.
-    """
+    """Yield the statements on the attitude increment of a step by series, and on its rate ∇S_1 for h → 0."""
     system, group, chart = compilation.system, attitude.group, compilation.realisation
     # With forces, α and β are evaluated at p = ∇S_h + hζ, but the attitude increment is that of ∇S_h alone.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)

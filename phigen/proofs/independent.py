@@ -272,11 +272,10 @@ class _Derivation:
 
 
 def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
-    """Return the statement that both expressions of each pair are equal, as functions of their symbols.
+    """Return the statement that the two expressions of each pair are equal, as functions of their symbols.
 
-    Equality is proved if the difference, as a polynomial in functions, is 0 by the relations of `Functions`. Otherwise
-    both expressions are evaluated at points with `DIGITS` digits: if they differ, equality is refuted, else it is
-    checked.
+    Equality is proved if the difference is 0 in the ring `Functions`. Otherwise the expressions are evaluated at points
+    with `DIGITS` digits. Equality is refuted if the values differ at a point, and checked if they agree.
     """
     fewest, open_pairs = POINTS, 0
     for label, theirs, mine in pairs:

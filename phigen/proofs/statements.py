@@ -102,7 +102,7 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements that π is skew and that it satisfies the Jacobi identity; the latter only if π is skew."""
+    """Return the statement that π is skew. If π is skew, the statement of the Jacobi identity follows."""
     skew = checks.skew_symmetry(system)
     return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
 

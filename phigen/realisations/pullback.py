@@ -62,11 +62,10 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
 
 
 def is_composed(system: System, realisation: BiRealisation) -> bool:
-    """Whether α and β are the maps of ``realisation.inner``, transformed from the coordinates y = ψ(x) to those of the
-    spec.
+    """Whether α and β are the maps of ``realisation.inner``, transformed from the coordinates y = ψ(x) to x.
 
     If so, the axioms for α and β follow from the axioms in the coordinates y, since the lift of ψ to (x, p) is
-    symplectic. That ψ⁻¹ is the inverse of ψ is proved by `change_of_coordinates`.
+    symplectic. `change_of_coordinates` proves that ψ⁻¹ is the inverse of ψ.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False

@@ -10,8 +10,8 @@ trick", has α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and a map ψ 
 The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. The
 article says this of ψ, but ψ changes x by −½πp.
 
-If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. If moreover the flow has a closed form, α and β have one too. Examples are the
-constant and the log-canonical bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat
+If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. If the flow also has a closed form, α and β have closed forms. Examples are the
+constant and the log-canonical bi-realisation, and nilpotent flows for which Φˢ*ω is linear in s. For the flat
 spray (f = 0), Ω₀ = Σ d(mean_i of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p. This spray has the S_i
 of Karasev's construction. Any other spray changes S_3 by a function G(x, ∇H) with G(x, p) cubic in p. The reason is
 that two symmetric bi-realisations differ by a symplectic map that is the identity to first order at p = 0.

@@ -1,8 +1,8 @@
 """Jacobi's elliptic functions for the free rigid body. All follow from one real number, κ = tan(φ/4)/√P.
 
 For P ≥ Q ≥ 0 the amplitude φ is the increasing solution of φ̇² = P − Q sin²φ with φ(0) = 0. Let S = sin(φ)/√P, C = cos φ
-and D = √(1 − QS²). For the argument √P t and the modulus √(Q/P), these are sn/√P, cn and dn; moreover Ṡ = CD. With
-κ = tan(φ/4)/√P and z = Pκ²,
+and D = √(1 − QS²). In Jacobi's notation, S = sn/√P, C = cn and D = dn at the argument √P t, with the modulus √(Q/P).
+The derivative of S is CD. With κ = tan(φ/4)/√P and z = Pκ²,
 
     S = 4κ(1 − z)/(1 + z)²,    C = (1 − 6z + z²)/(1 + z)²,    D² = C² + (P − Q)S².
 

@@ -113,7 +113,7 @@ ENTIRE: dict[str, Entire] = {
 
 
 class _Library:
-    """A library of functions, extended by the functions of `ENTIRE`. The latter are computed by their closed forms."""
+    """A library of functions, extended by the closed forms of the functions of `ENTIRE`."""
 
     def __init__(self, library: Any) -> None:
         self._library = library

@@ -1,6 +1,6 @@
-"""The universal anomaly of a Kepler motion: s with ds = dt/r, for ellipses, parabolas, hyperbolas and radial motions.
+"""The universal anomaly of a Kepler motion: s with ds = dt/|q|, for ellipses, parabolas, hyperbolas and radial motions.
 
-For q̈ = −μq/r³, let r = |q| and η = q·q̇ at the start, and β = 2μ/r − q̇². After the time t, s is the solution of
+For q̈ = −μq/|q|³, let r = |q|, η = q·q̇ and β = 2μ/r − q̇² at the start. After the time t, s is the solution of
 
     r G1 + η G2 + μ G3 = t,    G1 = s sinroot(βs²),  G2 = s² sinroot(βs²/4)²/2,  G3 = s³ arcroot(βs²)
 
@@ -48,7 +48,7 @@ def slopes(
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
-    """Return the universal anomaly s of a Kepler motion q̈ = −μq/r³ after the time t.
+    """Return the universal anomaly s of a Kepler motion q̈ = −μq/|q|³ after the time t.
 
     The arguments are r = |q|, η = q·q̇, β = 2μ/r − q̇² and ``spin`` = |q × q̇|² at the start. ``library`` is `math`,
     for double precision, or an mpmath context, for the precision of this context. Raises `ValueError` if there is no
