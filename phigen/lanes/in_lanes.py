@@ -91,7 +91,7 @@ class Blocks:
     def grouped(self, stored: int) -> bool:
         """Whether members are integrated in groups, that is, whether a group fits on the stack.
 
-        ``stored`` is the number of values of the predictor of each member.
+        ``stored`` is the number of values that the predictor of one member stores.
         """
         return _DOUBLE * LANES * (self.room + stored) <= MAX_STACK_BYTES
 
@@ -449,7 +449,7 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     return replace(kernel, name="evaluate", purpose=purpose, outputs=outputs, named=named)
 
 
-#: The function that finds the parts in lanes, for each kind of step that has such parts.
+#: For the kinds of steps that may be computed in lanes: the function that returns the parts of a program in lanes.
 LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
     "newton": _of_newton,
     "explicit": _of_explicit,

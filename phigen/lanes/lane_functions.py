@@ -1,5 +1,5 @@
-"""Versions of elementary functions for loops over SIMD lanes. Functions without such a version prevent a compiler from
-vectorising a loop.
+"""Versions of elementary functions for loops over SIMD lanes. A loop that calls other functions is not vectorised by
+compilers.
 """
 
 from __future__ import annotations

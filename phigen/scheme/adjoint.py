@@ -46,12 +46,13 @@ def pulled_back(
     variables: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """Return the kernel that computes cotangents of some inputs of a kernel from the cotangents of its values.
+    """Return the kernel that computes cotangents of some inputs of ``kernel`` from the cotangents of some
+    values.
 
-    ``seeds`` lists the values: it maps the name of a new input to the values whose cotangents this input holds.
-    ``variables`` maps the name of an input array to its symbols. For an array ``x`` the new kernel has the output
-    ``x_bar``: the derivatives of Σ cotangent · value, summed over all values, with respect to the symbols of ``x``.
-    ``purpose`` is the comment in the generated code.
+    The keys of ``seeds`` are the new inputs, which hold the cotangents of the values listed under the key.
+    ``variables`` maps the name of an input array of ``kernel`` to its symbols. For an array ``x`` the new kernel has
+    the output ``x_bar``: the derivatives of Σ cotangent · value, summed over all values, with respect to the symbols of
+    ``x``. ``purpose`` is the comment in the generated code.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero

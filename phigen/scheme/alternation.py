@@ -20,9 +20,9 @@ from fractions import Fraction
 from phigen.scheme.composition import COMPOSITIONS, Composition
 
 # Coefficients of the methods S_6 of order 4 and S_10 of order 6, by S. Blanes, P. C. Moan, Practical symplectic
-# partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002). For each method, these are
-# the first half of a_1, a_2, … and the first half of b_1, b_2, … The middle values are left out; they follow from Σa =
-# Σb = 1.
+# partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002). A method is given by the
+# first half of a_1, a_2, … and the first half of b_1, b_2, … The middle values are left out; they follow from Σa = Σb =
+# 1.
 _S6 = ("0.0792036964311957 0.353172906049774 -0.0420650803577195", "0.209515106613362 -0.143851773179818")
 _S10 = (
     "0.0502627644003922 0.413514300428344 0.0450798897943977 -0.188054853819569 0.541960678450780",

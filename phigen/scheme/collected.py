@@ -1,8 +1,8 @@
 """Collected polynomials. Their variables depend on the state; their coefficients do not.
 
-The coefficients are expressions in parameters and step size. Differentiation only multiplies them by integers, or by
-the coefficients in the derivatives of function values such as sin(q). So a gradient and a Hessian are written with the
-coefficients of the function itself, and ``prepare`` computes each coefficient once.
+The coefficients are expressions in parameters and step size. The derivative of a variable such as sin(q) is a
+polynomial in the variables too. So a coefficient of a gradient or a Hessian is a sum of coefficients of the function,
+multiplied by integers and by coefficients of the derivatives of variables. ``prepare`` computes each coefficient once.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ Terms = Mapping[Monomial, Expression]
 
 @dataclass(frozen=True)
 class Collected:
-    """A ring of collected polynomials: its variables, which depend on the state, and their derivatives along the
-    coordinates."""
+    """A ring of collected polynomials: its variables, and the derivatives of the variables with respect to the
+    coordinates.
+    """
 
     variables: tuple[Expression, ...]
     slopes: tuple[tuple[Terms, ...], ...]  # slopes[v][j] = ∂variable_v / ∂x_j

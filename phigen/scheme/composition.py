@@ -1,4 +1,4 @@
-"""Symmetric compositions: a step of high order, composed of steps of a symmetric method of order 2.
+"""Symmetric compositions: a step of high order consists of several steps by a symmetric method of order 2.
 
 A step is Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h} with γ_i = γ_{s+1−i}, where φ_h is a step of the method of order 2. A
 composition of Poisson maps is a Poisson map. A composition of symmetric methods with symmetric coefficients γ is

@@ -34,8 +34,8 @@ _ALTERNATIVE = "for scheme: splitting, "
 #: and no composition is computed for comparison. The error of the direct series is smaller.
 MIN_COST_TO_COMPOSE = 2_000
 
-#: Largest accepted ratio of the costs of the direct series and of a composition. Up to this ratio the direct series is
-#: chosen, since its error constant is smaller.
+#: Largest accepted value of the ratio: cost of the direct series, divided by that of a composition. Up to this ratio
+#: the direct series is chosen, since its error constant is smaller.
 MAX_DIRECT_COST_RATIO = 4
 
 #: Largest number of terms S_1, S_2, … for which phigen also tries to write S_h as a graph of shared sub-expressions.

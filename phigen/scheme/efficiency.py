@@ -63,7 +63,9 @@ def cost(program: Program, grown: float = 1.0) -> float:
 
 
 def series_bound(program: Program, order: int) -> float:
-    """Return a lower bound of the `cost` of a series of the given ``order``, from its program of a lower order."""
+    """Return a lower bound for the `cost` of a series of the given ``order``; ``program`` is the series with a lower
+    order.
+    """
     longest = cost(program, order / program.order) * _steps(program)[program.order + program.order % 2]
     return longest / SERIES_STEPS[order + order % 2]
 

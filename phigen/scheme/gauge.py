@@ -178,7 +178,7 @@ def unaffordable(system: System) -> str:
 
 
 def guide_operations(system: System) -> int:
-    """Return an estimate of the number of operations of π∇S_3, computed from H and π without S_3.
+    """Return an estimate of how many operations π∇S_3 needs, computed from H and π without S_3.
 
     Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H. The estimate is the number of products of monomials
     in this sum. For sums of thousands of products, the true number was measured to be 0.6 to 1 times the estimate.

@@ -242,7 +242,7 @@ def _with_all_coefficients(reduced: ReducedSweeps, coefficients: Coefficients) -
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """Return the Jacobians of the vector field of a stage and of the change of the coordinates.
+    """Return two Jacobians: that of the vector field at a stage, and that of the change of the coordinates.
 
     The derivatives are with respect to the coordinates at the start of the step, without the time, and to the unknowns
     of the stage.

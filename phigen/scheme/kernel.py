@@ -34,7 +34,7 @@ class Role(Enum):
     FOLLOW = auto()  # the derivative of ADVANCE in the direction of a variation of y
     GATHER = auto()  # the terms of the sums over the bonds or pairs of a site
     ENERGY = auto()  # the Hamiltonian or a part of it; on lattices, its density at a site
-    ENERGY_SLOPE = auto()  # the derivative of the density of a part of H in the direction of a variation
+    ENERGY_SLOPE = auto()  # the derivative, along a variation, of the density of a part of H
     CASIMIRS = auto()
     VECTOR_FIELD = auto()
     OBSERVABLES = auto()  # observables that are single numbers; on lattices, their density at a site
@@ -106,9 +106,9 @@ class Kernel:
 
     The first output may contain matrices A; the generated function then returns exp(A) − 1 in place of A.
     ``exponentials`` has two numbers for each A: the index of its first entry in the output, and its number of rows. The
-    transpose of such a kernel has two inputs for cotangents. ``coef_bar`` has the cotangents of exp(A) − 1, and
-    `EXPONENTS` the cotangents of the matrices A. The generated code computes `EXPONENTS` from ``coef_bar`` and from the
-    matrices A, which the kernel ``exponents`` computes.
+    transpose of a kernel with exponentials has two inputs for cotangents. ``coef_bar`` has the cotangents of exp(A) −
+    1, and `EXPONENTS` the cotangents of the matrices A. The generated code computes `EXPONENTS` from ``coef_bar`` and
+    from the matrices A, which the kernel ``exponents`` computes.
     """
 
     name: str

@@ -18,7 +18,7 @@ from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
-    """Return the kernel of the derivatives of α and of β − α with respect to the mean y of a path with n
+    """Return the kernel that differentiates α and β − α with respect to the mean y of a path with n
     coordinates.
 
     Its inputs are the derivatives with respect to the middle m and to p, and Hess S_h. Let M and N be the derivatives

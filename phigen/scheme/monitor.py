@@ -2,9 +2,9 @@
 
 A canonical pair (t, e) is added to the coordinates, and H is replaced by K = g(x)(H(x) + e). Where K = 0, that is, for
 e = −H(x₀), the orbits of K are those of H. Along these orbits dt/dτ = ∂K/∂e = g. K does not depend on t, so e is
-constant, and the solver treats it as a parameter with a value for each trajectory. If the pair has the midpoint
-realisation, the step in x is that of the series S_τ(x; e) of K, and t₁ − t₀ = ∂S_τ/∂e at the solution y of its implicit
-equation. The time is as accurate as x, since (t, x) is a step of one method.
+constant, and the solver treats it as a parameter with a value for each trajectory. Let the bi-realisation of the pair
+be the midpoint rule. Then the step in x is that of the series S_τ(x; e) of K, and t₁ − t₀ = ∂S_τ/∂e at the solution y
+of its implicit equation. One method computes t and x, so t is as accurate as x.
 
 With forces, −H(x) is not constant and no step is a Poisson map, so K is not used. Instead, p = τg(∇H + ζ) and the
 impulse τgf at y, together with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x). Here ζ is the covector

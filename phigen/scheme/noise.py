@@ -44,8 +44,7 @@ def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
 
 
 def noise_flows(system: System) -> tuple[Flow, ...]:
-    """Return for each source of noise the flow of its Hamiltonian g. Raises `SpecError` if such a flow is not
-    elementary."""
+    """Return for each source of noise the flow of its Hamiltonian g. Raises `SpecError` if a flow is not elementary."""
     return tuple(_flow(system, source) for source in system.noise)
 
 
@@ -76,7 +75,7 @@ def driven(system: System) -> list[Flow]:
     """Return for each source of noise the flow of its Hamiltonian over the duration σ ΔW, where ΔW is the increment of
     the source in half a step.
 
-    Raises `SpecError` if such a flow is not elementary.
+    Raises `SpecError` if a flow is not elementary.
     """
     timed_flows = zip(noise_flows(system), driving_times(system), strict=True)
     return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in timed_flows]

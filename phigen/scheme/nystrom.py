@@ -54,7 +54,8 @@ class Nystrom:
 
 
 def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Return a symmetric method for H = T + V from the first half of its times and of the multiples of its kicks.
+    """Return a symmetric method for H = T + V. ``half`` has the first half of its times, and ``multiples`` the first
+    half of the multiples of its kicks.
 
     The halves include the middle values. ``first`` is T or V, the part with which a step begins.
     """

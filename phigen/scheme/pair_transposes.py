@@ -1,10 +1,10 @@
-"""Transposes of sums over the bonds or pairs of the sites of a lattice: each site collects its cotangents from its
+"""Transposes of sums over the bonds or pairs of each site of a lattice: a site collects its cotangents from its
 bonds.
 
 A site is the end a of some bonds and the end b of others. Often the sum at b equals the sum at a up to its sign, as for
 forces between two sites. Then one formula is sufficient: the contribution that a site receives as end b is the formula
-of the end a, applied to the cotangents of the site at the other end. This formula is a product of the Hessian of the
-energy of a pair with one vector.
+of the end a, applied to the cotangents of the site at the other end. This formula is a Hessian times one vector, and
+the Hessian is that of the energy of the pair.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ T = TypeVar("T")
 #: The inputs of a step that change from step to step, with their description in generated code.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: Two names: that of the table of coefficients as an argument of kernels, and that of the output of ``refresh``. This
-#: output is stored at the end of the table.
+#: TABLE is the name of the argument of kernels that holds all coefficients. NOW is the name of the output of
+#: ``refresh``, which is stored at the end of the table.
 TABLE, NOW = "coef", "now"
 
 

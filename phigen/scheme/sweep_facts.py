@@ -27,7 +27,7 @@ def reach(step: Sweeps) -> int:
 
 
 def band(step: Sweeps) -> int:
-    """Return the number of off-diagonals on each side of the Newton matrix of a stage; 0 if band elimination does not
+    """Return how many off-diagonals the Newton matrix of a stage has on each side; 0 if band elimination does not
     apply.
     """
     if not step.equation or step.partners or len(step.sites.axes) > 1:
@@ -148,7 +148,7 @@ def shares(step: Sweeps) -> bool:
 
 def givers(step: Sweeps) -> bool:
     """Whether each row needs a list of the rows that contribute to its cotangents, apart from the list of the rows that
-    it reads. The lists differ if an axis across rows has open ends: beyond such an end, a row reads a mirrored row with
+    it reads. The lists differ if an axis across rows has open ends: beyond an open end, a row reads a mirrored row with
     weight 0, but receives nothing.
     """
     return any(step.sites.open[:-1])

@@ -26,7 +26,7 @@ T = TypeVar("T")
 def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
     """Decorator that stores the last result of a function of a program and its step.
 
-    A printer calls such functions dozens of times with the same two objects.
+    Printers call the decorated functions dozens of times with the same program and step.
     """
     last: list[tuple[Program, Sweeps, T]] = []
 

@@ -23,7 +23,9 @@ from phigen.symbolic.symbols import momentum, variation
 def explicit_jacobian(
     explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients, name: str = "explicit_tangent"
 ) -> Kernel:
-    """Return the kernel of the Jacobian (n×n) of the increment of an explicit step or of a flow."""
+    """Return the kernel that differentiates the increment of an explicit step or a flow; its output is an n×n
+    matrix.
+    """
     columns = [derivatives(explicit.roots, c) for c in coordinates]
     n = len(coordinates)
     flat = coefficients.hoist([columns[j][i] for i in range(n) for j in range(n)])
@@ -51,8 +53,8 @@ def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
     """Return the recurrences of a path ṁ = π(m)p together with its variation v.
 
     v is due to variations of the start and of p. With the variation w of p, v̇ = ∂_m(π(m)p) v + π(m) w. The coordinates
-    of the recurrences are first the x, then the ``v:x``, which are the components of v. The components of w have the
-    symbols of the momenta of ``v:x``.
+    of the recurrences are first the x, then the components ``v:x`` of v. The symbols for the components of w are those
+    that momenta of the coordinates ``v:x`` have.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]
