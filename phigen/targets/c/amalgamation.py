@@ -159,7 +159,9 @@ _BEHIND = "/* */"
 
 
 def _spaced(lines: Sequence[str]) -> str:
-    """Return lines as text, with at most one blank line in succession, and with none after the title of a chapter."""
+    """Return lines as text, with at most one blank line in succession, and with none after a title such as /* ----
+    steps ---- */.
+    """
     spaced: list[str] = []
     for line in lines:
         if line or (spaced and spaced[-1] and not spaced[-1].endswith(" ---- */")):

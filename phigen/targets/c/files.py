@@ -291,7 +291,7 @@ CALLS = {
 
 
 def guard(file: str) -> str:
-    """Return the name of the include guard of a file of the runtime."""
+    """Return the name of the include guard of a runtime file."""
     return f"PHI_FILE_{file.removesuffix('.c').replace('.', '_').upper()}"
 
 

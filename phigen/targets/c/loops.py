@@ -97,7 +97,7 @@ def table(printed: ir.ConstantTable, program: Program) -> str:
 
 
 def statements(printed: ir.Function, program: Program, *, shared_line: int = 0) -> list[str]:
-    """Return the lines of the body of a function of a solver.
+    """Return the lines of the body of a function in a solver.
 
     With ``shared_line``, several declarations of computed values are on one line of at most this number of characters.
     With 0, each declaration has its own line.

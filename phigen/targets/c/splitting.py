@@ -106,11 +106,11 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
 def adjoint_in_lanes(
     program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], full_range: Mapping[str, str]
 ) -> list[str]:
-    """Return the text of the transposes of the flows for batches of members in SIMD lanes.
+    """Return the text of the transposed flows for SIMD batches of members.
 
-    The transposes call the versions ``near`` of elementary functions. Some of these versions are correct only for small
-    arguments. A transpose that calls such a version is printed a second time, with the versions ``full_range`` for all
-    arguments.
+    The transposed flows call the versions ``near`` of elementary functions. Some of these versions are correct only for
+    small arguments. A transposed flow that calls one of them is printed a second time, with the versions ``full_range``
+    for all arguments.
     """
     kernels, build = _transposed(program, step, back)
     texts = []

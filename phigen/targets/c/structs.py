@@ -118,14 +118,14 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: Struct with the arguments of the reverse pass of an ensemble, without the arguments that all solvers have.
+#: Struct with those arguments of the reverse pass of an ensemble that only some solvers have.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
 )
 
-#: Members of the struct for the reverse pass of a batch of members: derivatives of L, the number whose gradient is
-#: computed.
+#: Members of the struct for the reverse pass of a SIMD batch of trajectories: derivatives of L, the number whose
+#: gradient is computed.
 BACK_GROUP = (
     StateBlock(
         "x",

@@ -164,7 +164,7 @@ def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
 
 
 def _is_comment(lines: Sequence[str], last: int) -> bool:
-    """Whether a comment of whole lines ends on line ``last``. Titles of chapters do not count."""
+    """Whether a comment of whole lines ends on line ``last``. Titles such as /* ---- steps ---- */ do not count."""
     if not lines[last].endswith("*/") or lines[last].startswith("/* ---- "):
         return False
     return lines[_beginning(lines, last)].startswith("/*")

@@ -12,7 +12,7 @@ from phigen.scheme.program import Program
 
 @dataclass(frozen=True)
 class Spills:
-    """Measurement for one system: the CUDA compiler compiled its steps by the series for the architecture
+    """Measurement for one system. The CUDA compiler compiled steps with ``scheme: series`` for the architecture
     sm_90.
 
     ``size`` is the number of bytes of one member that are in memory, because they do not fit into registers.

@@ -130,9 +130,9 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
 
 
 def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str, Kernel]) -> Iterator[str]:
-    """Yield the text of the transposes of all sweeps or, for implicit steps, of the kernels of a stage.
+    """Yield the text of the transposed sweeps or, for implicit steps, of the transposed kernels of a stage.
 
-    A list that has the transposes of each part comes last.
+    The last text is a list of the transposes of each part.
     """
     step = loops.step
 

@@ -106,7 +106,7 @@ class _Pulled:
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
-    """Return the text of the loops, and of the functions that run the reverse pass of each part or of each kernel of a
+    """Return the text of the reverse pass: loops, and functions that run the loops for a part of H or for a kernel of a
     stage.
     """
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
@@ -198,7 +198,7 @@ class _Reverse(RowLoops):
         return commented(build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True), self.program)
 
     def of_parts(self) -> Iterator[Back]:
-        """Yield the traversals of all sweeps of each part of H.
+        """Yield, for each part of H, the calls of its transposed sweeps in the two traversals of the sites.
 
         The second traversal is left out if the next flow of the reverse pass adds the contributions.
         """
@@ -241,7 +241,7 @@ class _Reverse(RowLoops):
             yield replace(both, first=(*both.first, *copied), second=second)
 
     def of_equation(self) -> Iterator[Back]:
-        """Yield both traversals of the sites for each kernel in the reverse pass of a stage.
+        """Yield, for each transposed kernel of a stage, its calls in the two traversals of the sites.
 
         The first traversal of the first kernel also computes the sums over bonds or pairs.
         """

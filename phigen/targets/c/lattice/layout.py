@@ -56,8 +56,8 @@ class Layout(RowLayout):
 
     @property
     def partners(self) -> Partners:
-        """The kernels of sums over bonds or pairs. Kernels of derivatives of sums along variations are left out if
-        ``slopes`` is false.
+        """The kernels of sums over bonds or pairs. If ``slopes`` is false, the kernels that differentiate sums along
+        variations are left out.
         """
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))

@@ -28,7 +28,7 @@ from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import function
 from phigen.targets.header import plain, sentence
 
-#: Pattern of the name of a part of H in comments.
+#: Pattern of names such as H_1, which parts of H have in comments.
 _PART = re.compile(r"\bH_\d+")
 
 #: Number of doubles in the buffer for densities of observables: two memory pages, a quarter of the L1 cache. If a
@@ -161,11 +161,11 @@ class RowLoops:
             yield over or row_loops.over_pairs(one, self.layout)
 
     def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
-        """Return the additional arguments of a loop over bonds; () if it has none. In short code, a loop has these
-        arguments if several parts of H share it.
+        """Return the additional arguments of a loop over bonds; () if it has none. In other profiles than ``fast``, a
+        loop has these arguments if several parts of H share it.
 
-        The arguments are the arrays of parameters at bonds, the direction in which bonds are read (1 or −1), and a
-        flag: whether the sites of the chosen colour are at the opposite ends of bonds.
+        The arguments may be three: the arrays of parameters at bonds; the direction of a bond at the site where it
+        begins, 1 or −1; and a flag that is set if the sites of the chosen colour are at the opposite ends of bonds.
         """
         if self.fast or self.layout.step.adjoint or not self.layout.graph:
             return ()
