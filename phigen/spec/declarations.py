@@ -92,8 +92,8 @@ class Declarations:
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
         """Return the ``names`` that may have an index, because their values differ from site to site.
 
-        An index is an offset on a grid, or one of the ``ends`` of a bond. The result is None if the spec is not that
-        of a lattice, or if expressions must not contain an index.
+        An index is an offset on a grid, or one of the ``ends`` of a bond. The result is None if the spec has no
+        lattice, or if expressions must not contain an index.
         """
         if self.lattice is None or not self.indexed:
             return None

@@ -382,8 +382,8 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for words that are not keys of a run, but that users may write as such. A hint says where the setting belongs,
-#: or which key a run has instead.
+#: Hints for words that users may write as keys of a run by mistake. A hint says where the setting belongs, or which key
+#: a run has instead.
 _BESIDE_RUNS = {
     key: f"{key}: is a key of the whole spec: write it beside runs:, not in a run"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")

@@ -382,9 +382,9 @@ class Record(Kind):
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
         """Report an unknown key. Return the known key that was probably meant, and the value.
 
-        The first result is "" if no known key resembles the unknown one. The value is read only after a probable
-        spelling error; otherwise the second result is None. For instance, it is None for words of other programs
-        (`MEANT`), because other programs often write values differently.
+        The first result is "" if no known key resembles the unknown one. The value is read only if the unknown key is
+        probably a misspelt known key; otherwise the second result is None. For instance, the second result is None for
+        words of other programs (`MEANT`), because other programs often write values differently.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)

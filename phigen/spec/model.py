@@ -164,7 +164,7 @@ class BirealisationChoice:
     beta: tuple[Expression, ...] = ()
     side: str = "q"  # for canonical-euler: q or p, the coordinates that α leaves unchanged
     of: str = "auto"  # for product: the kind of the blocks; for pullback: the kind of the inner structure
-    tau: Expression | Matrix | None = None  # for group-map: the map τ, as f(MATRIX) or as a matrix in the momenta
+    tau: Expression | Matrix | None = None  # for group-map: the map from the algebra to the group, a function or matrix
     spray: str | tuple[Expression, ...] = "auto"  # for spray: auto, flat, natural or the components f_j(x, p)
     degree: int | None = None  # for spray: largest degree in p of the series; None for the degree that the order needs
     order: int | None = None
@@ -545,7 +545,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """Order that the spec requests. If the spec states the number ``terms`` instead, it is rounded up to even."""
+        """Order that the spec requests. Without an order, it is the number ``terms``, rounded up to an even number."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(

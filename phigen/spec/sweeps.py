@@ -107,8 +107,8 @@ def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
 def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tuple[str, str] | None:
     """Return why a sweep cannot average observables over the rows of this run, and a hint; None if it can.
 
-    A sweep averages over states after whole steps, or over its frames. With a monitor, the physical times of these
-    states are unknown.
+    A sweep averages over states after whole steps, or over its frames. With a monitor, sweeps do not know the physical
+    times of states.
     """
     averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
     if averages and run.is_timed and not sweep.frames:
