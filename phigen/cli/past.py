@@ -1,4 +1,4 @@
-"""Runs that start at the last state of another run, which is read from the file of that run."""
+"""Runs that start at the last state of another run. The state is read from the file of the other run."""
 
 from __future__ import annotations
 

@@ -238,7 +238,7 @@ def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str,
 
 
 def _modified(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return a sum of powers of h times H_j for the modified Hamiltonian H̃, and the first H_j, as (name, text)."""
+    """Return the modified Hamiltonian H̃ = H + h^j H_j + … and its first terms H_j, as pairs of name and text."""
     from phigen.notation.generating import modified_formulas
 
     corrections = modified_formulas(compilation, count, max_terms)
