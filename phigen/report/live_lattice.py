@@ -56,8 +56,8 @@ _DIRECTION = " The hue is the direction in the plane of {}, {}; lighter colours 
 class LatticeLive(Live):
     """Content of the live panel of a lattice.
 
-    In addition to the fields of `Live`, it has the ``start`` of the run, and the ``formulas`` of initial values as
-    JavaScript. The formulas are functions of site indices and sizes, so the panel can start with other sizes.
+    ``start`` is the start of the run. ``formulas`` is JavaScript for initial values: functions of site indices and
+    sizes. With these functions, the panel can start with other sizes.
     """
 
     start: Start | None = None
