@@ -51,8 +51,8 @@ def lattice_figure(
 
     If time, forces or noise change the energy, H(t) is drawn instead of the energy error. For systems of pairs, the
     paths in the plane of the first two coordinates are drawn. ``site_names`` are names of the sites of graphs and
-    pairs. If the run has observables, the dynamic structure factor S(q, ω), a correlation or Lyapunov exponents,
-    further panels show them. A diagram has at most ``dots`` dots along the time axis.
+    pairs. If the run has observables, a dynamic structure factor, a correlation or Lyapunov exponents, further panels
+    show them. A diagram has at most ``dots`` dots along the time axis.
     """
     from matplotlib.figure import Figure
 

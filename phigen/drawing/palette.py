@@ -139,8 +139,8 @@ def save_for_pages(figure: Figure, path: Path) -> None:
 def in_both_themes(svg_text: str) -> str:
     """Return the SVG text with variables in place of the colours that differ between light and dark pages.
 
-    Browsers give the variables the values that the reader prefers. Programs that do not support variables need files
-    with literal colours.
+    In browsers, the variables have the colours for light or dark pages, as the reader prefers. Programs that do not
+    support variables need files with literal colours.
     """
     for role in DARK:
         svg_text = svg_text.replace(PALETTE[role], f"var(--{role})")

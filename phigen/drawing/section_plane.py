@@ -21,7 +21,8 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
     The columns belong to the first of the `phase_planes` in which two coordinates vary, such as a position and its
-    momentum. If there is no such plane, the first two varying columns are drawn. Constant columns are drawn last.
+    momentum. If there is no such plane, any varying columns are drawn. Constant columns are drawn only if fewer than
+    two columns vary.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
