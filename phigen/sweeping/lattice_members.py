@@ -32,8 +32,8 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 def begun(spec: Spec, run: Run, draw: int) -> Start:
     """Return the initial state and parameters of a member.
 
-    ``draw`` is the value of the member along the axis ``seed``; 0 if there is no such axis. It is added to the seeds of
-    all random values of the run.
+    ``draw`` is the value of the member along the axis ``seed``, or 0 if there is no such axis. The seeds of all random
+    values of the run are increased by ``draw``.
     """
     if not draw or run.lattice is None:
         return start_of(spec, run)

@@ -158,7 +158,7 @@ def values_of(axis: Axis) -> Floats:
 def _spaced(axis: Axis, share: Floats) -> Floats:
     """Return values between the ends of an axis. A ``share`` of 0 gives the first end, and 1 gives the last.
 
-    On the scale ``linear`` the values are linear in ``share``; on the scale ``log`` their logarithms are.
+    The values are linear in ``share``. If the scale of the axis is log, the logarithms of the values are linear.
     """
     first, last = axis.ends
     if axis.scale == "log":

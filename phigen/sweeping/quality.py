@@ -1,4 +1,4 @@
-"""Detection of members of a sweep whose results are meaningless, by their large energy errors."""
+"""Detection of members of a sweep whose results are meaningless, since their energy errors are large."""
 
 from __future__ import annotations
 
