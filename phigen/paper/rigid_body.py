@@ -67,7 +67,7 @@ def _runge_kutta(body: Bodies, h: float, steps: int, stride: int) -> Trajectory:
 
 
 def errors_plate(steps: int = LONG) -> Plate:
-    """Return the figure of the errors of energy and Casimir over a number of steps of the size used in the paper."""
+    """Return the figure of the errors of energy and Casimir over ``steps`` steps, with the step size of the paper."""
     body = bodies()
     stride = max(1, steps // ROWS)
     methods = {
