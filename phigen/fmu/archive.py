@@ -55,8 +55,8 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
 def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, bytes]:
     """Compile the FMU for several platforms, and return the shared libraries as bytes, by name of the platform.
 
-    ``platforms`` are the names of these platforms, by default of all platforms for which there is a compiler. Raises
-    `ToolchainError` if a compilation fails, or if there is no compiler for one of the ``platforms``.
+    ``platforms`` are names of platforms. By default, the FMU is compiled for every platform for which there is a
+    compiler. Raises `ToolchainError` if a compilation fails, or if there is no compiler for one of the ``platforms``.
     """
     available = compilers()
     unavailable = sorted(set(platforms) - set(available))

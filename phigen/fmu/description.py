@@ -169,7 +169,7 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
 
 
 def _without_control_characters(text: str) -> str:
-    """Return the text with single spaces in place of control characters, which XML forbids, and of line breaks."""
+    """Return the text on one line and without control characters, which XML forbids."""
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Cn", "Zl", "Zp") else c for c in text).split()
     )

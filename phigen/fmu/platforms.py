@@ -39,8 +39,8 @@ PLATFORMS = {
     )
 }
 
-#: Compiler flags. Fused multiply-adds are off, so results of two platforms differ only where their functions of libm
-#: differ. The library exports only the functions of FMI, and has no debugging symbols.
+#: Compiler flags. Fused multiply-adds are off, so results differ between platforms only if functions of libm differ.
+#: The library exports only the functions of FMI, and has no debugging symbols.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
 #: Time limit of a compilation in seconds. When zig first compiles for a platform, it also builds the libraries of this

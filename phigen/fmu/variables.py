@@ -50,7 +50,7 @@ def first_run(spec: Spec) -> Run:
     """Return the first run of the spec whose step is positive.
 
     The FMU has the initial state, the parameters and the step of this run. Raises `SpecError` for lattices, and for a
-    spec without such a run.
+    spec in which no run has a positive step.
     """
     if spec.lattice:
         hint = "make the FMU of an ordinary spec, which phigen show --expand SIZES prints for a small lattice"
