@@ -1,9 +1,8 @@
 """The energy balance of a driven lattice: H − ∫ P dt is constant along the motion, whereas H is not.
 
-The power P = dH/dt is a sum over sites, bonds and pairs. Each summand is the derivative of an energy density along the
-motion, plus its derivative with respect to time. P is evaluated after every step, also between stored states, and
-integrated by polynomials through eight neighbouring values. So the accuracy does not depend on how often states are
-stored.
+The power P = dH/dt is a sum over sites, bonds and pairs. Each summand is the total time derivative of an energy
+density. P is evaluated after every step, also between stored states, and integrated by polynomials through eight
+neighbouring values. So the accuracy does not depend on how often states are stored.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Expansion of a small lattice: a spec without the key ``lattice``, with a coordinate for each field of each site.
 
-This spec is called the ordinary spec. It defines the meaning of the lattice: the lattice must have the same equations
-of motion.
+This spec is called the ordinary spec. It defines the meaning of the lattice: the equations of motion of the lattice
+must be those of the ordinary spec.
 """
 
 from __future__ import annotations

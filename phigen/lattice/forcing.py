@@ -106,8 +106,8 @@ def _tangent_of_covector(cell: Cell, site_fields: SiteFields, field: str) -> dic
 
 
 def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
-    """Return the flow of a vector field under which each site moves independently, or the reason why there is no
-    elementary flow.
+    """Return the flow of a vector field that moves each site independently, or the reason why this flow is not
+    elementary.
     """
     nonzero_rates = {f: e for f, e in rates.items() if not e.is_zero}
     names = symbols_of(*nonzero_rates.values())

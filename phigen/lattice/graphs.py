@@ -6,8 +6,8 @@ colour: each term is summed over the bonds that begin at sites of the colour or,
 there. A step applies the flows of all colours one after the other.
 
 Two terms may be mirror images under the exchange of the ends a and b, such as x[a]*y[b] and y[a]*x[b] in a cross
-product. Two such terms are in one part: one is summed over the bonds that begin at sites of the colour, and the other
-over the bonds that end there. Then the two sums commute.
+product. A part contains a term and its mirror image: the term is summed over the bonds that begin at sites of the
+colour, and the mirror image over the bonds that end there. Then the two sums commute.
 """
 
 from __future__ import annotations

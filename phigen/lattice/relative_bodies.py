@@ -36,7 +36,7 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: The array of central masses M_i of the Kepler motions. The solver computes it from the masses of the bodies.
+#: Symbol of the central mass M_i in a Kepler motion. The solver computes the M_i from the masses of the bodies.
 INNER_MASS = Symbol("inner", "mass")
 
 #: Key of specs that selects relative coordinates, and the value of this key for Jacobi coordinates.

@@ -44,8 +44,7 @@ from phigen.symbolic.tower import Tower
 #: Largest number of colours. The search tries MAX_COLOURS^axes colourings, and each colour adds flows to a step.
 MAX_COLOURS = 4
 
-#: Kind of the symbols for the components of the gradient of a part. These components are constant along the flow of the
-#: part.
+#: Kind of the symbols that stand for the gradient of a part. The gradient is constant along the flow of the part.
 FORCE = "force"
 
 Steps = tuple[int, ...]
@@ -85,8 +84,8 @@ class Colouring:
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """Return one number for each axis. The size along the axis must be a multiple of this number. With seams all
-        numbers are 1, so that all sizes are allowed.
+        """Return the period of the colours along each axis. Sizes must be multiples of the periods. With seams all
+        periods are 1, so that all sizes are allowed.
         """
         if self.seams:
             return (1,) * len(boundary)
@@ -125,8 +124,8 @@ class BondSum:
     """Sums over the bonds or pairs of a site.
 
     ``values`` maps the symbol of each sum to its summand. In the summand, x[a] is x at the site itself, and x[b] is x
-    at the opposite end of the bond or pair. ``end`` says over which bonds the sums run: "a", those that list the site
-    first; "b", those that list the site second; "", all bonds of the site. In a part of one colour, ``chosen`` says
+    at the opposite end of the bond or pair. ``end`` says over which bonds the sums run: "a", bonds that list the site
+    first; "b", bonds that list the site second; "", all bonds of the site. In a part of one colour, ``chosen`` says
     which end of a bond has the colour: the site itself ("here") or the opposite end ("there"). The symbols in
     ``extremes`` stand for a maximum (``max``) or minimum (``min``) in place of a sum.
     """
@@ -160,9 +159,9 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    The flow of a term of H updates sites up to the distance ``near`` from the site where the term begins. If the value
-    of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no sites beyond this
-    distance. Otherwise a seam must be wider.
+    The flow of a term of H updates sites up to the distance ``near`` (a field of the seam) from the site where the term
+    begins. If the value of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no
+    sites beyond this distance. Otherwise a seam must be wider.
     """
     if period == 1:
         return Seam()

@@ -1,8 +1,8 @@
 """The transpose of a step of a lattice: kernels at a site that propagate cotangents backwards.
 
 A sweep adds increments to some fields of a site; the increments depend on values around the site. The transposed kernel
-takes the cotangents of the increments. For each value that the kernel of the sweep reads, it returns a contribution to
-the cotangent of this value. Targets add the contribution at the site of the value.
+takes the cotangents of the increments. For each value that the kernel of the sweep reads, the transposed kernel returns
+a contribution to the cotangent of this value. Targets add the contribution at the site of the value.
 
 In the series a stage is y = r(x, y), x' = x + a(y). Let λ be the cotangent of x'. Then μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ is
 solved for μ, and x̄ = λ + (∂r/∂x)ᵀμ is the cotangent of x. The products with transposed derivatives are computed by the

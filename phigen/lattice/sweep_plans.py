@@ -105,7 +105,9 @@ class SplittingPlan:
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """Whether each flow updates the sites of one colour of a graph only; () if all flows update all sites."""
+        """For each flow, whether it updates only the sites of one colour of a graph; () if all flows update all
+        sites.
+        """
         return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
 
     @property
