@@ -6,11 +6,11 @@ not know the flow of πζ, its summands πζ_i dx_i are parts, one for each comp
 f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i times a factor. It is tangent to
 the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping is ζ = λπb with b = ∇H. If its flow is not known, each block of π has flows of its own, from the components of b
-in the block. If these components together have no flow, they are divided into two summands: the terms that do not
-depend on the coordinates of the block, and all other terms. If the other terms have no flow either, each of their
-components is a summand. Finally, flows are combined into one part if none of them changes a coordinate that another one
-reads.
+Damping is ζ = λπb with b = ∇H. If phigen does not know its flow, each block of π has flows of its own, for the field
+λππb with the components of b in this block. If phigen does not know the flow of this field, b is divided into two sums:
+the terms that do not depend on the coordinates of the block, and all other terms. If phigen does not know the flow for
+the second sum, each component of the second sum has a flow of its own. Finally, flows are combined into one part if
+none of them changes a coordinate that another one reads.
 """
 
 from __future__ import annotations

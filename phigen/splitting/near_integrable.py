@@ -98,8 +98,9 @@ def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
 
 
 def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
-    """Return the terms of H without the monomials that belong to motions; terms without such monomials are left as
-    written."""
+    """Return the terms of H without the monomials that belong to motions. Terms that contain no monomial of a motion
+    are left as written.
+    """
     untouched, remaining = [], []
     for term in terms:
         motion_monomials = {

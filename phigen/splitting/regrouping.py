@@ -2,9 +2,9 @@
 
 *Companions* are functions C whose multiples may be subtracted from some terms and added as a separate term: H = λC + (H
 − λC). A suitable λ cancels a term that does not commute with others. For example, the free rigid body then has two
-parts instead of three. C is a Casimir of π, whose flow changes nothing, or a Casimir of the brackets of some
-coordinates that are closed under brackets. An example on se(3)* is |m|² with the angular momentum m: it commutes with
-every function of m.
+parts instead of three. C is a Casimir of π, whose flow changes nothing, or a Casimir of a sub-bracket. A sub-bracket
+consists of the brackets of some coordinates, if these brackets depend on no other coordinates. An example of C on
+se(3)* is |m|² with the angular momentum m, since |m|² commutes with every function of m.
 
 *Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """
