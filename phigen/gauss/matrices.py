@@ -1,9 +1,9 @@
 """Star algebras of matrix Lie algebras.
 
 Let the matrices ρ represent a Lie algebra. If there is an invertible bilinear form B with ρᵀB + Bρ = 0, then the
-associative algebra that the ρ and 1 generate has the involution a ↦ B⁻¹aᵀB. If there is no such form, the
-representation ρ ⊕ −ρᵀ has one, which pairs the two summands. So the number of unknowns is at most n² for so(n) and
-so(p, q) with p + q = n, 4n² for sp(2n), and 2n² for su(n), sl(n) and gl(n).
+associative algebra that the ρ and 1 generate has the involution a ↦ B⁻¹aᵀB. If there is no form of this kind, ρ ⊕ −ρᵀ
+takes the place of ρ. For this representation there is a form, which pairs the two summands. So the number of unknowns
+is at most n² for so(n) and so(p, q) with p + q = n, 4n² for sp(2n), and 2n² for su(n), sl(n) and gl(n).
 """
 
 from __future__ import annotations
