@@ -3,10 +3,10 @@
 A part is written as C + Q + R: a multiple C of a Casimir, Q = ½c|m|² with the angular momentum m, and the remainder R.
 The gradients of Q and R must be constant along the flows of Q and R. Then the group element of the flow is exp(t∇Q)
 exp(t∇R), times the rotation by C. The rotation by C does not change x, and the durations of the flows in a step add up
-to h. So it is applied once in a step.
+to h. So the rotation by C is applied once in a step.
 
-With forces, a monitor, or a time in H, the rotation by C is not uniform. Then C has an element in each flow, as Q and R
-have. The same holds for a Casimir in the Hamiltonian of a noise source. If a flow is composed of commuting flows, its
+With forces, a monitor, or a time in H, the rotation by C is not uniform. Then the element of each flow has a factor for
+C. The same holds for a Casimir in the Hamiltonian of a noise source. If a flow is composed of commuting flows, its
 element is the product of their elements. Elements of free rigid bodies are in `phigen.attitude.free_bodies`.
 """
 

@@ -2,9 +2,9 @@
 loops. The E_i are the basis matrices of the Lie algebra.
 
 By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix with N rows. So all powers of P, and the series
-of exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors satisfy a recurrence. Computing P², …, P^{N−1} takes
-N − 2 products of matrices. Up to signs, the q_j are the elementary symmetric functions of the eigenvalues. Newton's
-identities give them from the traces of powers of P.
+of exp, are combinations of 1, P, …, P^{N−1}. The scalar factors of these combinations satisfy a recurrence. Computing
+P², …, P^{N−1} takes N − 2 products of matrices. Up to signs, the q_j are the elementary symmetric functions of the
+eigenvalues. Newton's identities give them from the traces of powers of P.
 
 In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) = 1 +
 sin(√s)/√s P + (1 − cos √s)/s P², for any s.
