@@ -15,7 +15,7 @@ from phigen.reading import opened
 from phigen.writing import replacing
 
 _IDENTITY = "identity"
-#: Names of those settings of a run that a checkpoint stores as hashes. Error messages do not print these values.
+#: Names of those settings of a run that a checkpoint stores as hashes. Error messages do not print the hashes.
 HASHES = ("spec", "solver")
 
 

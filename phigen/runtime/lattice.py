@@ -201,11 +201,11 @@ class LatticeTrajectory:
     the final state.
 
     ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, as a memory map if they were written
-    to a file, and ``energy`` (frames,) the values of H. There is a frame after every stride-th of the ``steps`` steps
-    of size ``h``, or at each given time. The last frame is at the end, which may be inside a step. ``observed``
-    (frames, observables) are the observables that are one number each. ``crossings`` has the states at which the
-    trajectory crosses the section of the run. ``retried`` are the numbers of those steps that failed and were repeated
-    as several smaller steps.
+    to a file, and ``energy`` (frames,) the values of H. The integration made ``steps`` steps of size ``h``, with a
+    frame after every stride-th step, or at each given time. The last frame is at the end, which may be inside a step.
+    ``observed`` (frames, observables) are the observables that are one number each. ``crossings`` has the states at
+    which the trajectory crosses the section of the run. ``retried`` are the numbers of those steps that failed and were
+    repeated as several smaller steps.
 
     With a monitor (dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without
     a monitor. If the run continues another run, ``joined`` is true and ``tau`` None. ``structure_factor`` and
@@ -871,8 +871,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
         """Return the initial time, by default 0: a number, or an array (members,) if ``t0`` is an array.
 
-        If H does not depend on the time, ``t0`` can only be the name of a parameter, whose value is added to
-        ``by_keyword``.
+        If H does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. It is then added
+        to ``by_keyword``.
         """
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0

@@ -59,8 +59,8 @@ class MemberBatch:
 
     ``who`` are the numbers of these members and ``x`` their states. ``final`` and ``turned`` have the last state and
     the last attitude of all members, including failed members. ``failures`` maps failed members to their status.
-    ``failed_at`` is the number of steps before the first failure. ``first`` (members, numbers) are initial attitudes,
-    None if the spec has no attitude.
+    ``failed_at`` is the number of steps before the first failure. ``first`` has the initial attitude of each member;
+    it is None if the spec has no attitude.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:

@@ -1,9 +1,9 @@
 """Solver and sessions in NumPy, which call the functions of a generated module.
 
 Sessions call the functions from which the module's ``integrate`` is made: ``_values``, ``_admissible``,
-``_coefficients`` and ``_advance``. If the Hamiltonian depends on the time, they also call ``_renewed``; for tangents
-``_tangent_stage``; with a monitor ``_time_of``; and further functions for attitudes. Ensembles
-(`phigen.runtime.numpy_members`) call the same functions.
+``_coefficients`` and ``_advance``. Sessions also call ``_renewed`` if the Hamiltonian depends on the time,
+``_tangent_stage`` to compute tangents, ``_time_of`` if there is a monitor, and further functions for attitudes.
+Ensembles (`phigen.runtime.numpy_members`) call the same functions.
 """
 
 from __future__ import annotations

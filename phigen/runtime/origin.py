@@ -2,9 +2,9 @@
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
 run``. The line is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
-figures, films and pages. A ``.csv`` cannot contain the line, since some programs would read it as data. It is in the
-file ``FILE-metadata.json`` beside the ``.csv`` instead. This is the place for metadata in the W3C recommendation
-"Metadata Vocabulary for Tabular Data".
+figures, films and pages. A ``.csv`` cannot contain the line, since some programs would read it as data. The line of a
+``.csv`` is in ``FILE-metadata.json`` beside the ``.csv``: the W3C recommendation "Metadata Vocabulary for Tabular Data"
+names this file.
 """
 
 from __future__ import annotations

@@ -42,9 +42,9 @@ class Marks:
     """Data of the rows of a trajectory, in addition to the states.
 
     ``tau`` (rows,) is h times the number of steps. With a monitor (rescaled time: dt = g dτ) this is the rescaled time
-    τ, and ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and
-    positions. ``steps`` is the number of steps of the whole trajectory. ``retried`` are the numbers of those steps that
-    failed and were repeated as smaller steps.
+    τ, and ``passed`` (rows,) is the physical time since the start. A row of ``turned`` has the components of an
+    attitude and a position. ``steps`` is the number of steps of the whole trajectory. ``retried`` are the numbers of
+    those steps that failed and were repeated as smaller steps.
     """
 
     tau: Floats

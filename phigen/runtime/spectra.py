@@ -188,7 +188,7 @@ def correlation(
 
 
 def equal_times(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames for a spectrum: of all frames from the time ``after`` on.
+    """Return the times of the frames from which a spectrum is computed: all frames from the time ``after`` on.
 
     A last frame at a shorter distance is left out. Raises `ValueError` for fewer than four frames, and for unequal
     distances in time.

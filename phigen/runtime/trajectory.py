@@ -31,11 +31,11 @@ class Trajectory:
     """States of one integration. Row 0 is the initial state, the last row the final state.
 
     ``t`` (rows,) are the times, ``x`` (rows, DIM) the states, ``energy`` (rows,) the values of H; ``casimirs`` and
-    ``observables`` map names to values (rows,). There is a row for every stride-th of the ``steps`` steps of size
-    ``h``, and for the last step. If the spec has a monitor, which rescales time by dt = g dτ, h is a step in τ, and
-    ``tau`` (rows,) are the values of τ; otherwise ``tau`` is ``t``. ``retried`` are the numbers of those steps that
-    failed and were repeated as several smaller steps. If the spec says ``reconstruct``, ``attitude`` is a quaternion
-    (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is (rows, 3).
+    ``observables`` map names to values (rows,). The integration made ``steps`` steps of size ``h``, with a row after
+    every stride-th step and after the last. If the spec has a monitor, which rescales time by dt = g dτ, h is a
+    step in τ, and ``tau`` (rows,) are the values of τ; otherwise ``tau`` is ``t``. ``retried`` are the numbers of those
+    steps that failed and were repeated as several smaller steps. If the spec says ``reconstruct``, ``attitude`` has a
+    quaternion (w, x, y, z) or an n × n matrix in each row, and ``position`` has the shape (rows, 3).
     """
 
     t: Floats

@@ -44,7 +44,7 @@ class Device(Protocol):
         ...
 
     def kernel(self, program: Any, name: str) -> Any:
-        """Return the kernel of a compiled program that has this name."""
+        """Return the kernel with this name in a compiled program."""
         ...
 
     def empty(self, size: int) -> Any:
@@ -80,10 +80,10 @@ Opened = dict[tuple[int, int | None], Any]
 
 
 def choose(names: Sequence[str], target: str, index: int | None) -> int:
-    """Return the number of the device to use.
+    """Return the number of the device to use: ``index`` or, if ``index`` is None, the user's choice.
 
-    This is ``index``. If ``index`` is None, it is the device that the environment variable `CHOICE` names, or 0 if the
-    variable is not set. ``names`` are the names of all devices. Raises `DeviceError` if there is no such device.
+    The environment variable `CHOICE` names the user's choice, by default device 0. ``names`` are the names of all
+    devices. Raises `DeviceError` if no device has the chosen number or name.
     """
     if index is not None and not hasattr(index, "__index__"):
         raise TypeError(f"device is {index!r}, but must be a number; the devices of {target} are {_listed(names)}")

@@ -31,8 +31,8 @@ _STEPS_PER_UNIT = 1 << 24
 #: Smallest number of members for each compute unit in one launch. While one member waits for memory, others compute.
 _MEMBERS_PER_UNIT = 2048
 
-#: Largest number of bytes that a member can use besides registers without leaving the cache of a card. A multiprocessor
-#: runs 256 members at once if each uses 255 registers, and these members share 128 kB of cache.
+#: Largest number of bytes outside of registers that each member can have in the cache of a card. A multiprocessor runs
+#: 256 members at once if each uses 255 registers. Together these members have 128 kB of cache.
 _LOCAL_BYTES = 512
 
 

@@ -1,6 +1,4 @@
-"""Sessions of lattices on devices. The state stays on the device, which also reduces energies and observables to
-numbers.
-"""
+"""Sessions of lattices on devices. The state stays on the device, which also computes energies and observables."""
 
 from __future__ import annotations
 
