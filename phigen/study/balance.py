@@ -1,9 +1,9 @@
 """Energy balance of systems in which H depends on the time, or forces act: H − ∫ P dt is constant along the motion.
 
-P = ∂_tH + ∇H·(πζ + f) is the power supplied by the explicit time dependence and by the forces ζ and f. So ∫ P dt is the
-work. The work between successive stored states is computed by Hermite's rule of order 8. The rule uses P and its first
-three derivatives along the motion at both ends of an interval. So the integral can be continued state by state, with
-any spacing in time. The difference from the rule of order 6 estimates the error.
+P = ∂_tH + ∇H·(πζ + f) is the power supplied by the time dependence of H and by the forces, a covector field ζ and a
+vector field f. So ∫ P dt is the work. The work between successive stored states is computed by Hermite's rule of order
+8. The rule uses P and its first three derivatives along the motion at both ends of an interval. So the integral can be
+continued state by state, with any spacing in time. The difference from the rule of order 6 estimates the error.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def _combination(stages: list[Floats], weights: Mapping[int, float]) -> Floats |
     return sum((w * stages[j] for j, w in weights.items()), 0.0)
 
 
-#: The function that makes a step, and the order, for each method by its name in specs.
+#: Name of a method in specs → the function that makes a step of the method, and its order.
 METHODS: Mapping[str, tuple[Step, int]] = {
     "euler": (euler, 1),
     "rk2": (rk2, 2),

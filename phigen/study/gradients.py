@@ -44,7 +44,7 @@ Measured = tuple[str, float, float, str]
 
 @dataclass(frozen=True)
 class GradedRun:
-    """Short run of a solver of one target from the state ``x`` (numbers,), with its derivatives.
+    """Short run of one target's solver from the state ``x`` (numbers,), with derivatives.
 
     ``rows(x, parameters)`` returns the states (rows, numbers). ``pullback(bars)`` returns the cotangents of x and of
     the parameters, by name, for the cotangents ``bars`` of the rows. ``carried(vectors)`` propagates tangent vectors

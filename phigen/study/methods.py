@@ -130,9 +130,9 @@ def size_of(x: Floats) -> float:
 def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
     """Return the derivative (DIM, DIM) of a step by central differences of order 6.
 
-    A coordinate is displaced in proportion to its size. If the largest coordinate is more than ten times larger, the
-    displacement is in proportion to a tenth of the largest one. With ``by_coordinate`` each nonzero coordinate is
-    displaced in proportion to its own size, which suits, for example, momenta of small masses. ``finer`` divides
+    A coordinate is displaced in proportion to its size. If another coordinate is more than ten times larger, the
+    displacement is in proportion to a tenth of the largest coordinate. With ``by_coordinate`` each nonzero coordinate
+    is displaced in proportion to its own size, which suits, for example, momenta of small masses. ``finer`` divides
     displacements.
     """
     size = size_of(x)
