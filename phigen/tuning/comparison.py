@@ -33,8 +33,7 @@ STATES = 5
 ROWS = 2000
 #: Classical methods of the comparison, with their names in tables.
 PEERS = {"rk4": "RK4", "dop853": "DOP853"}
-#: Shares of the time budget. BUILDING: for all builds. REFERRING: for each reference solution; each method needs its
-#: own.
+#: Shares of the time budget. BUILDING: for all builds. REFERRING: for the reference solution of one method.
 BUILDING, REFERRING = 0.6, 0.05
 
 Notify = Callable[[str], object]

@@ -57,8 +57,8 @@ MOST_LETTERS = 160
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25
-#: HALVINGS: largest number of halvings of a step. MOST: a run with a monitor may have this number of times the steps of
-#: the run without one.
+#: HALVINGS: largest number of halvings of a step. MOST: largest number of steps of a run with a monitor, divided by the
+#: number of steps of the run without one.
 HALVINGS, MOST = 30, 64
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 from phigen.tuning.settings import Setting, direct, variants
 from phigen.tuning.trials import Point
 
-#: A scan measures a method with step sizes that decrease by the factor FINER, at most MOST_POINTS of them.
+#: A scan measures a method with at most MOST_POINTS step sizes, each smaller than the one before by the factor FINER.
 FINER, MOST_POINTS = math.sqrt(2.0), 48
 #: Number of times that a scan reduces its first step size if runs with it fail.
 FAILURES = 16
@@ -222,10 +222,11 @@ def _refined(
 def _points_at_largest_step(
     measure: Callable[[float], Point | None], first: float, largest_step: float, patience: Callable[[], bool]
 ) -> list[Point]:
-    """Return the first points of a scan, from the largest possible step down to ``first``.
+    """Return the points with which a scan begins, the largest step first.
 
-    If a run with ``first`` fails, the step is reduced by factors `FINER` until a run succeeds. If no run succeeds, the
-    list is empty.
+    The first run has the step ``first``. If this run succeeds, the step is increased by factors `FINER`, until a run
+    fails or the step is ``largest_step``. Otherwise the step is reduced by factors `FINER`, until a run succeeds. If no
+    run succeeds, the list is empty.
     """
     step, point = first, measure(first)
     for _ in range(FAILURES):

@@ -188,8 +188,8 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
     """Return the finalists in the order of their cost, except that the first one is the simplest of the best.
 
-    The best are the methods whose cost is about the least one. The simplest of them has the smallest product of order
-    and number of stages. If two methods have the same product, the one without gauge is the simpler one.
+    The best methods are those whose cost is at most `EQUAL` times the least cost. The simplest method has the smallest
+    product of order and number of stages. Of two methods with equal products, the one without gauge is simpler.
     """
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
