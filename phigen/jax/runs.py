@@ -149,8 +149,8 @@ def _linear(
     """Return ``apply(arguments)`` for a linear map A. JAX shall compute the transpose of A by the function
     ``transpose``.
 
-    ``shape`` is the shape of the result. JAX accepts such a function only for the solution of a linear equation. So A
-    v, with v = ``arguments``, is computed as the part y of the solution (u, y) = (v, A v) of a trivial equation.
+    ``shape`` is the shape of the result. JAX accepts a function for the transpose only if A solves a linear equation.
+    So A v, with v = ``arguments``, is computed as the part y of the solution (u, y) = (v, A v) of a trivial equation.
     """
     # JAX requires that all parts of the equation depend linearly on the arguments, even a right-hand side that is 0. So
     # this zero is computed from the arguments, and is added.
