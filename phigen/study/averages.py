@@ -22,8 +22,8 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
-#: Least length of blocks for a reliable standard error, in correlation times τ. From blocks of length L, the variance of
-#: the mean is estimated as 1 − τ/L times its true value. With blocks of this least length, the estimate is 10 % too
+#: Least length of blocks for a reliable standard error, in correlation times τ. With blocks of length L, the variance
+#: of the mean is estimated as 1 − τ/L times its true value. With blocks of this least length, the estimate is 10 % too
 #: small.
 LEAST_LENGTH = 10.0
 #: An observable counts as conserved, up to the error of the method, if its values differ by less than this fraction of
