@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4556c14e4b83e8d0eb87c89b381a0e96b4062910365a433180e4c0b434a6182f
+ * body-sha256: 9af81c21a1596d91e374e7963a70d6828df0157fe40e3f73aec00ebd8fc60bc5
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -40,14 +40,14 @@ const DEFAULT_PARAMETERS = Object.freeze({
 /** Parameters that must be positive. */
 const POSITIVE = ["omega"];
 
-/** A step of size h is the composition of stages of these fractions of h. */
+/** A step of size h is a sequence of stages, whose sizes are these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Midpoint of each stage, as a fraction of the step, at which time-dependent coefficients are evaluated. */
+/** Midpoint of each stage, as a fraction of the step. Time-dependent coefficients are evaluated there. */
 const MIDDLES = [0.5];
 
 /**
- * Number of coefficients that depend on parameters and step size only; they are followed by the coefficients
+ * Number of coefficients that depend on parameters and step size only. They stand before the coefficients
  * that also depend on the time.
  */
 const PREPARED = 22;
@@ -58,7 +58,7 @@ const COEFFICIENTS = 33;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Iterations end if the next correction of y is expected to be smaller than this, relative to y. */
+/** The iteration for y ends if its next correction is expected to be smaller than this, relative to y. */
 const TOLERANCE = 1e-20;
 
 /** Compute the coefficients that depend only on parameters and step size. */
@@ -191,12 +191,12 @@ const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
 const REACH = 4.0;
-/** Number of stored differences; differences of higher order would amplify rounding errors. */
+/** Number of stored differences of solutions; higher differences would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -204,7 +204,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -219,7 +219,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -227,7 +227,10 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -236,9 +239,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/**
- * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
- */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -255,8 +256,9 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params t0".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
- * where required, and unless the coefficients of a very small step are finite.
+ * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown names,
+ * for values that are not finite, and for values that are not positive where this is required. The
+ * coefficients of a very small step must also be finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -300,11 +302,11 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size first, then of the time. */
+  /** For each stage, an array of coefficients; the last ones depend on the time. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -339,7 +341,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -360,8 +363,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -373,12 +376,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state.
+   * Return an independent solver with the same state, time and parameters.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined if there is no such field
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -387,8 +390,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -396,15 +399,15 @@ export class Solver {
   setParameters(changes) {
     const params = admitted({ ...this.params, ...changes });
     this.params = params;
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   /**
-   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Replace the state by x between steps; the time and the parameters stay the same. If x is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; the Casimirs then change, too
    * @returns {this}
    */
   setState(x) {
@@ -413,7 +416,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
+   * Add a change, such as an impulse, to the state between steps. If the change or the new state is not
+   * admissible, throws StepError and changes nothing.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -440,15 +444,16 @@ export class Solver {
   }
 
   /**
-   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
-   * length.
+   * Make count steps from each of many initial states. A trajectory ends before the first step that fails.
+   * h and parameters may be arrays with one number for each initial state. Throws StepError if an array has
+   * another length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states
    * @param {number | ArrayLike<number>} h step size
    * @param {number} count number of steps
    * @param {object} [options] as in the constructor, without x0
-   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each trajectory, and its
+   *   status: "OK", or the status of the step that failed
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -507,7 +512,7 @@ function vectorFieldAt(params, t, x, out) {
   vectorField(params, t, x, out);
 }
 
-/** Set the time of the initial state from the options of a solver, 0 by default. */
+/** Set the time of the initial state to the option t0, 0 by default. */
 function takeTime(solver, options) {
   [solver.t] = finite([options.t0 ?? 0], 1, "t0");
 }
@@ -517,7 +522,7 @@ function prepareStage({ params }, h, table) {
   prepare(params, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
@@ -548,7 +553,7 @@ function restoreState(solver, copies) {
 
 /**
  * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|; NaN or infinite if a component of the correction is.
+ * |y_j|. It is NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -571,10 +576,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
- * a status. The effect of the last correction on the increment is added to first order, without another
- * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
- * the square of the last one.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x. Returns a
+ * status. Iterations start from the predicted y. The next correction is about the square of the last one;
+ * iterations end when it is expected to be below TOLERANCE. The last correction of y changes the increment.
+ * This change is added to first order, without another evaluation.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -607,17 +612,17 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** Make one stage of a step; returns a status. */
+/** Make one stage of a step, and return its status. */
 function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
-/** Compute the coefficients that depend on the time; there is no noise dw. */
+/** Compute the coefficients that depend on the time. There is no noise, so dw is unused. */
 function refreshAt(row, t, dw, out) {
   refresh(row, t, out);
 }
 
-/** For the stages of the next step, compute the coefficients that differ from step to step. */
+/** For each stage of the next step, compute the coefficients that differ from step to step. */
 function renew({ coef, t, h, dw }) {
   coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
 }
@@ -627,7 +632,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages, when the state of a solver changes to x. */
+/** Adapt the predictors of all stages when the state of a solver is changed to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -640,8 +645,9 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
- * solution. It affects the speed only.
+ * Predictor of a stage. It stores the last solution y, and backward differences of earlier solutions. The sum
+ * of some of these entries predicts the next solution. Iterations start from the prediction, so a predictor
+ * affects the speed only.
  */
 class History {
   /** Number of stored entries: the last solution and its differences. */
@@ -657,7 +663,8 @@ class History {
   }
 
   /**
-   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
+   * The state was changed from `from` to `to`: add this change to the last solution. The differences stay the
+   * same.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -675,8 +682,8 @@ class History {
    * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
-   *     that the iteration could find an unrelated one
+   * @returns {boolean} false if no solution is known, or if the prediction is too far from the last
+   *     solution: the iteration might then find an unrelated solution
    */
   predict(value) {
     let distance = 0;
@@ -692,8 +699,8 @@ class History {
   }
 
   /**
-   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
-   * order with the smallest error is used next.
+   * Update the predictor with a solution. The new k-th difference is the error that a prediction of order k
+   * would have had. The next prediction has the order with the smallest error.
    *
    * @param {Float64Array} value
    */
@@ -724,8 +731,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
- * is too large may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. If a step is too large, its
+ * equation may have solutions far away, at another energy, that have nothing to do with the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -755,7 +762,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
+ * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -770,7 +777,7 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-/** Contribution of noise to the size of an increment of the state: 0, since there is no noise. */
+/** Size of the increment of the state by noise: 0, since there is no noise. */
 function sizeOfNoise() {
   return 0;
 }
@@ -781,8 +788,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small holds the compensation term and other terms
- * that are small compared with change.
+ * Add change + small to the state by compensated summation. small contains the compensation term, and other
+ * terms that are much smaller than change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
@@ -803,14 +810,14 @@ function advance({ x, carry }, change, small) {
   return true;
 }
 
-/** The smallest normal number: avoids division by zero. */
+/** The smallest normal number. It is added to divisors that may be 0. */
 const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.
+ * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
- * @param {Float64Array} side becomes the solution
+ * @param {Float64Array} side is overwritten with the solution
  * @returns {boolean} false if the matrix is singular
  */
 function solve(matrix, side) {

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 62d63f265c9bd03950677e251888bcf00d418f973f4c3bc8bdf1f8a7bb6a426c
+# body-sha256: bfa9fdada9a8797626bb40e314f7d9de3c354e0238fec04bbc3dc6fedef603bd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,18 +23,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("omega",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
+# The solver subtracts multiples of these Casimirs from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -46,26 +46,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -84,7 +84,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -94,7 +94,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -204,7 +205,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
+    """Return the solution of a linear system for each member. It is NaN if the matrix of the member is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -220,7 +221,8 @@ MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fr
 def _plausible(stage, x, end):
     """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
+    the motion.
     """
     _, parameters, h, t = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -234,7 +236,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
+    """Return the result of _attempt. Solutions that are not plausible get the status NO_CONVERGENCE."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -255,11 +257,12 @@ def _size(y, delta):
 
 
 def _attempt(coef, x, carry, y):
-    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
+    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x.
 
-    The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
-    its compensation term, y, and a status for each member, "" if it was solved.
+    x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
+    the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
+    member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -292,7 +295,8 @@ def _attempt(coef, x, carry, y):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    y is the solution of the stage. `memory` holds the offsets y - x of the last two steps, which predict the next.
+    `memory` holds the offsets y - x in the last two steps, where y is the solution of the stage. These offsets predict
+    the next one by linear extrapolation.
     """
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
@@ -306,20 +310,20 @@ def _advance(stage, x, carry, memory):
 
 
 def _choose_gauge(parameters, x):
-    """Return an array without columns: this solver subtracts no Casimirs from H."""
+    """Return an array (members, 0): this solver subtracts no Casimirs from H."""
     return np.zeros((len(x), 0))
 
 
-# The midpoint of each stage, as a fraction of the step; H is evaluated at that time.
+# The midpoint of each stage, as a fraction of the step. H is evaluated at this time.
 MIDDLES = (0.5,)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage of a step: coefficients, the parameters, the size of the stage, its entry of
-    MIDDLES.
+    """Return the data of each stage of a step: coefficients, the parameters, the size of the stage, and its midpoint
+    from MIDDLES.
 
     The coefficients are those that do not depend on the time. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same coefficients.
+    (coefficients, 1) if they are equal for all members.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     return [
@@ -331,8 +335,8 @@ def _coefficients(parameters, x, h, gauge):
 def _renewed(stage, t, h):
     """Return the data of a stage in the step of size h that begins at the time t.
 
-    The data are all coefficients, the parameters, the size of the stage, and the time of its midpoint. `stage` is what
-    _coefficients returns for the stage.
+    The argument `stage` is what _coefficients returns for the stage. The result has all coefficients, the parameters,
+    the size of the stage, and the time of its midpoint.
     """
     coef, parameters, step, middle = stage
     t = t + middle * h
@@ -341,20 +345,21 @@ def _renewed(stage, t, h):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
+    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
+    before it subtracts them from H."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, t0=0.0, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign, from the time t0. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign, from the time t0. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, t0=t0, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -362,7 +367,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -379,10 +384,10 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h, t0 and parameters
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h, t0 and parameters
     may be arrays with one number for each member. t0 is the time of x0.
-    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
+    step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8e73218baaad79ab962e24922a2cbd132a2fa40edf99d3c3528b62c985bf46dc
+# body-sha256: e23db3bc0c81766d013eb82fb8a3d18ac3838909c80518662004184787213dcf
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,28 +21,31 @@ DEFAULT_PARAMETERS = {
     "k": 1.0,
 }
 
-# Parameters that may be arrays with a value at each site, and those that must be positive.
+# Parameters that may be arrays with a value at each site.
 AT_SITES = ("k",)
+# Parameters that must be positive.
 POSITIVE = ("k",)
 
-# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
-# sites.
+# Whether the ends of the lattice are open, along each axis.
 OPEN = (False,)
+# Smallest number of sites along each axis.
 LEAST = (1,)
+# Numbers that must divide the number of sites along each axis.
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
-# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
-# H, row).
+# The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
+# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
 MULTIPLES = ()
+# The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    integrate() stored before this step.
     """
 
     def __init__(self, step, status, states):
@@ -54,18 +57,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step; its argument is the status."""
+    """A step failed; the argument of this error is the status."""
 
 
 def _finite(values):
-    """Return the values unchanged; raises FailedError if one is not finite."""
+    """Return the values unchanged. Raises FailedError if a value is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """Sites of a lattice of given sizes, with all parameters."""
+    """The sites of a lattice, and the parameters of the system."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -89,7 +92,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of a parameter: that of the sites, or () for a single value."""
+        """Return the shape of a parameter: the sizes of the lattice, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -133,15 +136,15 @@ class _Graph(_Sites):
         super().__init__(shape, parameters)
 
     def shape_of(self, parameter):
-        """Return the shape of a parameter: that of the sites, of the bonds, or () for a single value."""
+        """Return the shape of a parameter with values at sites or at bonds, or () for a single value."""
         return (len(self.ends),) if parameter in AT_BONDS else super().shape_of(parameter)
 
     def bonds(self, end, chosen):
-        """Return arrays `here`, `there` and `number` over all bonds, seen from their ends a or b, or from both ends
-        ("").
+        """Return three arrays over all bonds: `here`, `there` and the number of the bond.
 
-        here[k] is the site at the end from which bond number[k] is seen, there[k] the site at its opposite end. With
-        chosen "here" or "there", only bonds are listed whose site `here` or `there` has the present colour.
+        A bond connects a site a with a site b. `here` is the site at the given end, "a" or "b", and `there` the site at
+        the opposite end. If end is "", each bond occurs twice, once for each end. If chosen is "here" or "there", the
+        arrays contain only bonds whose site here or there has the present colour.
         """
         key = (end, chosen, chosen and self.colour)
         if key not in self._known:
@@ -155,18 +158,18 @@ class _Graph(_Sites):
         return self._known[key]
 
     def summed(self, values, here):
-        """Return, for each site, the sum of the values of its bonds; here[k] is the site to which values[k] belongs."""
+        """Return for each site the sum of the values of its bonds. values[k] belongs to the site here[k]."""
         return np.bincount(here, np.broadcast_to(values, here.shape), self.sizes[0])
 
 
-# For each part of H, whether its flow is made of one flow for each colour of sites. An entry of SCHEDULE here begins
-# not with a part of H, but with 0 for the first flow of all parts and colours, 1 for all inner flows, 2 for the last
-# flow, or 3 for all inner flows in reverse order.
+# For each part of H: whether its flow consists of one flow for each colour of sites. The flows of all
+# parts and colours form a list. An entry of SCHEDULE is (0, row) for the first flow of the list, (1, row) for all inner
+# flows, (2, row) for the last flow, and (3, row) for all inner flows in reverse order.
 BY_COLOUR = (True,)
 
 
 class _Coloured(_Graph):
-    """A graph whose sites have colours, such that no bond connects two sites of one colour."""
+    """A graph whose sites have colours. No bond connects two sites of the same colour."""
 
     def __init__(self, shape, parameters):
         super().__init__(shape, parameters)
@@ -189,7 +192,7 @@ class _Coloured(_Graph):
 
 
 def _advance(sites, rows, x, past):
-    """Return the state after one step from x; raises FailedError. `past` is unused: splittings need no predictors."""
+    """Return the state after one step from x. Raises FailedError if the step fails. `past` is unused."""
     for (part, sites.colour), row in sites.schedule:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -197,7 +200,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
+    """Return the coefficients of a step of size h: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -219,9 +222,9 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
-    (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (frames, DIM, *sizes).
 
+    x0 has the shape (DIM, *sizes).
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
     x, sites = _started(x0, parameters)
@@ -251,13 +254,13 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, in an array (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """Return pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), an array of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 30f9f4b5e330e7a231504cd8728828eb1a9d6043760b594097618da0c18df376
+# body-sha256: 2cf64628bd4c322a974c898a3233924c7c1b29e195f5cf45e88a1f8d82fd19b6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,28 +21,31 @@ DEFAULT_PARAMETERS = {
     "B": 0.2,
 }
 
-# Parameters that may be arrays with a value at each site, and those that must be positive.
+# Parameters that may be arrays with a value at each site.
 AT_SITES = ("B",)
+# Parameters that must be positive.
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
-# sites.
+# Whether the ends of the lattice are open, along each axis.
 OPEN = (False, False, False,)
+# Smallest number of sites along each axis.
 LEAST = (2, 2, 2,)
+# Numbers that must divide the number of sites along each axis.
 PERIODS = (1, 1, 1,)
 
-# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
-# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
-# H, row).
+# The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.5, 0.5, 1.0, 0.5, 0.5,)
+# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
 MULTIPLES = ()
+# The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    integrate() stored before this step.
     """
 
     def __init__(self, step, status, states):
@@ -54,18 +57,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step; its argument is the status."""
+    """A step failed; the argument of this error is the status."""
 
 
 def _finite(values):
-    """Return the values unchanged; raises FailedError if one is not finite."""
+    """Return the values unchanged. Raises FailedError if a value is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """Sites of a lattice of given sizes, with all parameters."""
+    """The sites of a lattice, and the parameters of the system."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -89,7 +92,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of a parameter: that of the sites, or () for a single value."""
+        """Return the shape of a parameter: the sizes of the lattice, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -117,7 +120,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """Return the state after one step from x; raises FailedError. `past` is unused: splittings need no predictors."""
+    """Return the state after one step from x. Raises FailedError if the step fails. `past` is unused."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -125,7 +128,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
+    """Return the coefficients of a step of size h: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -147,9 +150,9 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
-    (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (frames, DIM, *sizes).
 
+    x0 has the shape (DIM, *sizes).
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
     x, sites = _started(x0, parameters)
@@ -179,13 +182,13 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, in an array (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """Return pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), an array of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

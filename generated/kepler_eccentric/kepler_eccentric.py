@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 38cfd3a12f20f0dad9024458adb51833ed52c8fe78887c050c9bee5dacc23be6
+# body-sha256: ebfb51f26c43e6287bea98851a95fdc3cbd9ccdb6a6e84ca87ebcfe3efda6b43
 import numpy as np
 
 VERSION = "0.1.0"
@@ -24,18 +24,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ()
 
-# Name of the constant of a trajectory that gauge() returns: the energy level e = -H(x0).
+# Name of the constant of each trajectory that gauge() returns: the energy level e = -H(x0).
 GAUGE = ("e",)
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -47,26 +47,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -85,7 +85,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -95,7 +95,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -157,19 +158,20 @@ def _flow2(coef, state):
         ])
 
 
-# Coefficients are in rows of ROW numbers. TIMES has, for each row, the duration of its flow as a fraction of h.
-# SCHEDULE lists the flows of a step in order, each as (part of H, row).
+# The durations of the flows of a step, as fractions of h: one for each row of coefficients.
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
+# Number of coefficients in a row.
 ROW = 4
+# The flows of a step in order, each as (part of K, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12), (1, 13), (0, 14), (1, 15), (0, 16), (1, 17), (0, 18), (1, 19), (0, 20), (1, 21), (0, 22), (1, 23), (0, 24), (1, 25), (0, 26), (1, 27), (0, 28), (1, 29), (0, 30), (1, 31), (0, 32), (1, 33), (0, 34))
 FLOWS = (_flow1, _flow2,)
 
 
 def _advance(stage, x, carry, memory):
-    """Make one step of all members: the exact flows of the parts of the Hamiltonian K, one after the other.
+    """Make one step of all members, by the exact flows of the parts of the Hamiltonian K, one after the other.
 
-    Returns the new x, its compensation term, the physical time of the step (twice, in place of memory), and a status
-    for each member. The time is NaN if the argument of a logarithm in K has left its domain.
+    Returns the new x, its compensation term, a pair in place of memory, and a status for each member. Both entries of
+    the pair are the physical time of the step. It is NaN if the argument of a logarithm in K is not positive.
     """
     coef, elapsed = stage[0], np.zeros(len(x))
     for part, row in SCHEDULE:
@@ -186,7 +188,7 @@ def _prepare(parameters, gauge, h):
 
 
 def _choose_gauge(parameters, x):
-    """Return the energy levels e = -H(x), (members, 1), a constant of each trajectory from x."""
+    """Return the energy level e = -H(x) of each member, in an array (members, 1)."""
     return -_energy(parameters, x)
 
 
@@ -209,9 +211,9 @@ def _refused(parameters, x):
 
 
 def _time_of(stage, x, value):
-    """Return the physical time (members,) that passes in a stage from x with the solution `value`.
+    """Return for each member the physical time that passes in a stage from x; `value` is the result of the stage.
 
-    The time is NaN unless it has the sign of the step.
+    The time is NaN if its sign is not that of the step.
     """
     elapsed = value
     return np.where(elapsed * np.sign(stage[2]) > 0, elapsed, np.nan)
@@ -220,8 +222,8 @@ def _time_of(stage, x, value):
 def _coefficients(parameters, x, h, gauge):
     """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same coefficients.
+    The coefficients depend on parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if they are equal for all members.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -231,20 +233,20 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the energy level e = -H(x), (..., 1), a constant of each trajectory from x that integrate() computes."""
+    """Return the energy level e = -H(x) that integrate() uses for trajectories from x, in an array (..., 1)."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -252,7 +254,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -269,12 +271,12 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    Steps have size h in the time tau. With times=True, the result is a pair: the states, and their times t, of shape
-    (rows, ...).
+    h is the size of a step in the time tau. With times=True, the result is a pair: the states, and an array (rows, ...)
+    of their times t.
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge replaces the energy level e = -H(x0): the step is a Poisson map for each fixed e.
+    gauge replaces the energy level e = -H(x0). For a fixed e, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

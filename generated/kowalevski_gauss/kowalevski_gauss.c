@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 47022775101259fdcb87505280c7649843ed2d9c051439a66a6ae9cebf7c3cd7
+ * body-sha256: 81a40c1fe06a9b023611d27fc105d2e4278b94688f574799ec0fc697b307fba0
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -331,7 +331,8 @@ static void kowalevski_gauss_stage_field_lanes(const double coef[1], const doubl
     }
 }
 
-/* Derivatives k of the unknowns, transformed to the frame of the end z of a step, in all lanes. */
+/* Derivatives k of the unknowns of a step that ends at z, transformed to the unknowns of the next step, in
+   all lanes. */
 static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double x[6], const double z[8],
     kowalevski_gauss_lanes k[restrict 8], kowalevski_gauss_lanes seen[restrict 8])
 {
@@ -524,7 +525,7 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
 }
 
 enum {
-    /* a step fails if the change grows in (number of stages + this) sweeps in a row */
+    /* a step fails if changes grow in (number of stages + this) successive sweeps */
     kowalevski_gauss_MOST_RISING = 3,
     /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3a12668736dc698c0bfa9668f49904bf83b75ec3e0ad1ec7eb300c3707255030
+# body-sha256: 757e12f4471ac96c621d6bd7c6ed05ebe595229936bbc93a86e2353471f04edc
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,18 +21,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ()
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
+# The solver subtracts multiples of these Casimirs from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -44,26 +44,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -82,7 +82,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -92,7 +92,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -177,7 +178,8 @@ def _stage_change(coef, x, z):
 
 
 def _next_frame(coef, x, z, k):
-    """Derivatives k of the unknowns, transformed to the frame of the end z of a step."""
+    """Derivatives k of the unknowns of a step that ends at z, transformed to the unknowns of the next
+    step."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]
@@ -200,7 +202,7 @@ def _next_frame(coef, x, z, k):
         ])
 
 
-MOST_RISING = 3  # a step fails if the change grows in (number of stages + this) sweeps in a row
+MOST_RISING = 3  # a step fails if changes grow in (number of stages + this) successive sweeps
 SOLVED = 2e-18  # sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
 ROUNDING = 4e-16  # at changes below this, sweeps end when a change exceeds STALLED times the one before
@@ -233,15 +235,19 @@ def _point(stage, x):
 
 
 def _slopes(stage, point, z):
-    """Return the increments h b_j f(Z_j) of all stages j from their unknowns Z_j; arrays (unknowns, members,
-    stages)."""
+    """Return the increments h b_j f(z_j) of all stages j: z_j are the unknowns of the stage, f(z_j) their derivatives.
+
+    z and the result are arrays (unknowns, members, stages).
+    """
     weights = np.broadcast_to(np.reshape(stage[2], (-1, 1)) * WEIGHTS, point.shape[:2])
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
 def _change_of(x, change, increments):
-    """Return the largest change of the unknowns at any stage, (members,); changes of the first PLAIN unknowns are
-    measured relative to |x|, or to their increments if x = 0."""
+    """Return for each member the largest change of the unknowns at any stage.
+
+    Changes of the first PLAIN unknowns are relative to |x|, or to the increments of these unknowns if x = 0.
+    """
     square = np.sum(x**2, axis=-1)[:, np.newaxis] + np.finfo(float).tiny
     square = np.where(square > np.finfo(float).tiny, square, square + np.sum(increments[:PLAIN] ** 2, axis=0))
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / square, np.sum(change[PLAIN:] ** 2, axis=0)
@@ -249,8 +255,11 @@ def _change_of(x, change, increments):
 
 
 def _solved(stage, x, z):
-    """Solve the equations of a step by fixed-point sweeps from the unknowns z; return the increments of all stages,
-    (unknowns, members, stages), and a status for each member, "" if solved."""
+    """Solve the equations of a step by fixed-point sweeps, which start from the unknowns z of all stages.
+
+    Returns the increments of all stages, an array (unknowns, members, stages), and a status for each member: "" if the
+    equations were solved.
+    """
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     point = _point(stage, x)
     solved = _slopes(stage, point, z)
@@ -264,7 +273,7 @@ def _solved(stage, x, z):
         before = previous[open_]
         rate = size / np.maximum(before, np.finfo(float).tiny)
         rates[open_] = np.where((rate > 0) & (rate < 1) & (size > NEARLY_ROUNDING), 0.7 * rates[open_] + 0.3 * rate, rates[open_])
-        # Converged if the next sweep would change less than rounding, or if changes no longer shrink.
+        # Converged if the next sweep would only change the last bits, or if small changes no longer shrink.
         slow = (rate >= 1) | (rate > np.maximum(1.5 * rates[open_], STALLED))
         rises[open_] += (rate >= 1) & (size <= NEARLY_ROUNDING)
         done = (rates[open_] * size <= SOLVED) | (slow & (size <= ROUNDING)) | (rises[open_] > 1)
@@ -280,11 +289,11 @@ def _solved(stage, x, z):
 
 
 def _factors_at(fractions):
-    """Return factors f_j of the stage increments at fractions of a step, (fractions, stages).
+    """Return factors of the stage increments at fractions of a step, in an array (fractions, stages).
 
-    The sum of f_j times increment j is the collocation polynomial minus its value at the end of the step. The factors
-    are integrals of Lagrange polynomials from 1 to the fraction, divided by the weights, by sums of Legendre
-    polynomials.
+    The sum of factor j times increment j is the collocation polynomial minus its value at the end of the step. The
+    factors are integrals of Lagrange polynomials from 1 to the fraction, divided by the weights. They are computed by
+    sums of Legendre polynomials.
     """
     x, nodes = 2 * np.reshape(fractions, (-1, 1)) - 1, 2 * NODES - 1
     legendre = np.polynomial.legendre.legvander
@@ -293,19 +302,22 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, increments, fractions):
-    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x."""
+    """Return states at fractions of a step that ends at x, in an array (fractions, DIM).
+
+    `increments` are the stage increments of the step, transformed to unknowns relative to x (see _advance).
+    """
     offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
 
-# Predictor of the stages of a step from the stage increments of the last one.
+# Factors by which the stage increments of the last step predict the stages of the next step.
 PREDICTION = _factors_at(1 + NODES)
 
 
 def _with_new_step(memory, ratio):
     """Return `memory` with predicted unknowns, for a step after a kick or of another size than the last step.
 
-    `ratio` is the new size divided by the last one. If it exceeds 1 in magnitude, there is no prediction.
+    `ratio` is the new size divided by the last one. If |ratio| > 1, there is no prediction.
     """
     if memory[1].ndim == 4 and ratio == 1:
         return memory
@@ -315,16 +327,16 @@ def _with_new_step(memory, ratio):
 
 
 def _predicted(memory):
-    """Return predicted unknowns, (unknowns, members, stages), or None before the first step."""
+    """Return predicted unknowns, an array (unknowns, members, stages); None before the first step."""
     if memory[1].ndim == 3:
         return memory[1] @ PREDICTION.T
     return memory[1][0] if memory[1].ndim > 3 else None
 
 
 def _in_next_frame(stage, x, end, increments):
-    """Return increments (unknowns, members, columns) of a step from x, transformed to the frame at the end of the step.
+    """Return increments of a step from x, transformed to the unknowns of the next step, which starts at the end.
 
-    The next step uses this frame. `end` is the sum of the stage increments of the step.
+    `increments` and the result are arrays (unknowns, members, columns). `end` is the sum of the stage increments.
     """
     start = np.repeat(_point(stage, x)[:, :1], increments.shape[-1], axis=1)
     return np.moveaxis(_next_frame(stage[0][:, :, np.newaxis], start, end[:, :, np.newaxis], increments), -1, 0)
@@ -333,8 +345,8 @@ def _in_next_frame(stage, x, end, increments):
 def _advance(stage, x, carry, memory):
     """Make one step of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    `memory` is a pair: the stage increments of the last step, and these increments in the frame at the end of that
-    step. The second may instead be the starting values of the sweeps.
+    `memory` is a pair: the stage increments of the last step, and these increments transformed to the unknowns of the
+    next step. In place of the second array, it may have the starting values of the sweeps.
     """
     predicted = _predicted(memory)
     anew = np.zeros((8, len(x), len(WEIGHTS)))
@@ -352,15 +364,15 @@ def _advance(stage, x, carry, memory):
 
 
 def _choose_gauge(parameters, x):
-    """Return an array without columns: this solver subtracts no Casimirs from H."""
+    """Return an array (members, 0): this solver subtracts no Casimirs from H."""
     return np.zeros((len(x), 0))
 
 
 def _coefficients(parameters, x, h, gauge):
     """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same coefficients.
+    The coefficients depend on parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if they are equal for all members.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -370,20 +382,21 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
+    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
+    before it subtracts them from H."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -391,7 +404,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -408,10 +421,10 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
+    step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 77518a47667d14d05e5e11e311e576a6ae4c4c2400ddd8043262f17d43c53ed8
+ * body-sha256: 485ee6e0ce9b9abf94afe7561f1d208cf8b4222ff8bf199fd5621fc3ed11433c
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -37,10 +37,10 @@ const DEFAULT_PARAMETERS = Object.freeze({
 /** Parameters that must be positive. */
 const POSITIVE = ["g"];
 
-/** A step of size h is the composition of stages of these fractions of h. */
+/** A step of size h is a sequence of stages, whose sizes are these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Number of coefficients: functions of parameters and step size. */
+/** Number of coefficients. They do not depend on the state. */
 const COEFFICIENTS = 2;
 
 /** Compute the coefficients that depend only on parameters and step size. */
@@ -82,7 +82,7 @@ const PROBE_STEP = 1e-100;
 
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -90,7 +90,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -105,7 +105,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -113,7 +113,10 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -122,9 +125,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/**
- * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
- */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -141,8 +142,9 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
- * where required, and unless the coefficients of a very small step are finite.
+ * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown names,
+ * for values that are not finite, and for values that are not positive where this is required. The
+ * coefficients of a very small step must also be finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -186,9 +188,9 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size. */
+  /** For each stage, an array of coefficients. They depend on parameters and step size. */
   coef = emptyTables();
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -220,7 +222,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -240,8 +243,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -253,12 +256,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state.
+   * Return an independent solver with the same state, time and parameters.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined if there is no such field
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -267,8 +270,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -276,15 +279,15 @@ export class Solver {
   setParameters(changes) {
     const params = admitted({ ...this.params, ...changes });
     this.params = params;
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   /**
-   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Replace the state by x between steps; the time and the parameters stay the same. If x is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; the Casimirs then change, too
    * @returns {this}
    */
   setState(x) {
@@ -293,7 +296,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
+   * Add a change, such as an impulse, to the state between steps. If the change or the new state is not
+   * admissible, throws StepError and changes nothing.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -319,15 +323,16 @@ export class Solver {
   }
 
   /**
-   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
-   * length.
+   * Make count steps from each of many initial states. A trajectory ends before the first step that fails.
+   * h and parameters may be arrays with one number for each initial state. Throws StepError if an array has
+   * another length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states
    * @param {number | ArrayLike<number>} h step size
    * @param {number} count number of steps
    * @param {object} [options] as in the constructor, without x0
-   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each trajectory, and its
+   *   status: "OK", or the status of the step that failed
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -391,7 +396,7 @@ function prepareStage({ params }, h, table) {
   prepare(params, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
@@ -422,7 +427,7 @@ function restoreState(solver, copies) {
 
 const increment = new Float64Array(DIM);
 
-/** Make one stage of a step, x + increment(x); returns a status. */
+/** Make one stage of a step: add its increment to x. Returns a status. */
 function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;
@@ -435,8 +440,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small holds the compensation term and other terms
- * that are small compared with change.
+ * Add change + small to the state by compensated summation. small contains the compensation term, and other
+ * terms that are much smaller than change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

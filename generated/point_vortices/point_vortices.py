@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d12582a008aad23c8499ea5414ceeaee2d181a9bb289d7e99c903e209f0aa2e5
+# body-sha256: 5a75d4172ab5f224ecb8705bc04230c3150282f8c4a5f82d07b73f5d7302cb81
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,28 +23,31 @@ DEFAULT_PARAMETERS = {
     "G": None,
 }
 
-# Parameters that may be arrays with a value at each site, and those that must be positive.
+# Parameters that may be arrays with a value at each site.
 AT_SITES = ("G",)
+# Parameters that must be positive.
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
-# sites.
+# Whether the ends of the lattice are open, along each axis.
 OPEN = (False,)
+# Smallest number of sites along each axis.
 LEAST = (1,)
+# Numbers that must divide the number of sites along each axis.
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
-# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
-# H, row).
+# The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
+# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
 MULTIPLES = ()
+# The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    integrate() stored before this step.
     """
 
     def __init__(self, step, status, states):
@@ -56,18 +59,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step; its argument is the status."""
+    """A step failed; the argument of this error is the status."""
 
 
 def _finite(values):
-    """Return the values unchanged; raises FailedError if one is not finite."""
+    """Return the values unchanged. Raises FailedError if a value is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """Sites of a lattice of given sizes, with all parameters."""
+    """The sites of a lattice, and the parameters of the system."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -93,7 +96,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of a parameter: that of the sites, or () for a single value."""
+        """Return the shape of a parameter: the sizes of the lattice, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -120,7 +123,7 @@ class _Sites:
         return self._known[bounds]
 
 
-# Largest numbers of sweeps of a stage, and of Newton corrections.
+# Largest number of sweeps for a stage, and largest number of Newton corrections for a stage.
 MOST_SWEEPS = 200
 DIFFERENCES = 4  # number of differences in the predictor of a stage
 PATIENCE = 10  # number of sweeps before Newton's method may replace slow sweeps
@@ -132,19 +135,21 @@ NEARLY_SETTLED = 2.0**-30  # Newton's method does not take over at changes below
 
 
 def _usual(y):
-    """Return the size of each field of y: its largest magnitude, plus a small part of the largest magnitude of all
-    fields."""
+    """Return the size of each field of y, that is of each coordinate at all sites.
+
+    It is the largest magnitude in the field, plus LEAST_SIZE times the largest magnitude in all fields.
+    """
     sizes = np.abs(y).max(tuple(range(1, y.ndim)))
     return sizes + LEAST_SIZE * sizes.max() + 1e-300
 
 
 def _size(change, y):
-    """Return the largest change of a field of y relative to the size of the field."""
+    """Return the largest change in a field of y, relative to the size of the field."""
     return (np.abs(change).max(tuple(range(1, y.ndim))) / _usual(y)).max()
 
 
 def _by_sweeps(coef, x, y, sites):
-    """Return the solution y of a stage by fixed-point sweeps from a prediction y; raises FailedError."""
+    """Return the solution of a stage by fixed-point sweeps from the prediction y. Raises FailedError if they fail."""
     before = 0.0
     for sweeps in range(1, MOST_SWEEPS + 1):
         following = _relax(coef, x, y, sites)
@@ -153,7 +158,7 @@ def _by_sweeps(coef, x, y, sites):
         _finite(following)
         change = _size(following - y, following)
         y, shrunk = following, before - change
-        # Stop if the expected change by all further sweeps is below rounding, or if changes no longer shrink.
+        # Stop if all further sweeps together would only change the last bits, or if small changes no longer shrink.
         if change * change <= shrunk * SETTLED or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
             return y
         if sweeps > PATIENCE and change > max(SLOW * before, NEARLY_SETTLED):
@@ -163,10 +168,9 @@ def _by_sweeps(coef, x, y, sites):
 
 
 def _remember(differences, value):
-    """Update the list of backward differences with a new value. Returns how many should be summed for the next
-    prediction.
+    """Update the list of backward differences with a new value. Returns how many of them predict the next value.
 
-    This number would have predicted the new value best.
+    The prediction is their sum. This number of differences would have predicted the new value best.
     """
     order, least, following = 1, np.inf, value
     for k in range(min(len(differences), DIFFERENCES)):
@@ -183,8 +187,8 @@ def _remember(differences, value):
 def _advance(sites, rows, x, past):
     """Return the state after one step from x; raises FailedError if it fails.
 
-    `past` has the predictor of each stage: the order of extrapolation, and backward differences of past values of y -
-    x, where y is the solution of the stage.
+    `past` has the predictor of each stage: the number of differences to be summed, and backward differences of the
+    values of y - x in earlier steps, where y is the solution of the stage.
     """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
@@ -202,7 +206,7 @@ PLAUSIBLE = 1.5  # largest accepted |y - x| of a solution y, relative to |x| + |
 
 
 def _middle(coef, x, prediction, sites, past):
-    """Return the solution y of a stage: by fixed-point sweeps until they fail, then by Newton's method."""
+    """Return the solution of a stage by fixed-point sweeps. Once they have failed, Newton's method replaces them."""
     if "stiff" not in past:
         try:
             return _by_sweeps(coef, x, prediction, sites)
@@ -215,7 +219,7 @@ def _middle(coef, x, prediction, sites, past):
 
 
 def _newton(coef, x, y, sites):
-    """Return the solution y of a stage by Newton's method; raises FailedError."""
+    """Return the solution of a stage by Newton's method from the prediction y. Raises FailedError if it fails."""
     before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
     for correction in range(MOST_SWEEPS):
         swept = _finite(_relax(coef, x, y, sites))
@@ -232,7 +236,10 @@ def _newton(coef, x, y, sites):
 
 
 def _krylov(matrix, side, usual):
-    """Return an approximate solution of matrix(v) = side by GMRES without restart; `usual` are the sizes of the fields."""
+    """Return an approximate solution of matrix(v) = side by GMRES without restart.
+
+    Norms and scalar products are computed in units of `usual`, which has a size for each field.
+    """
     usual = usual.reshape(-1, *(1,) * (side.ndim - 1))
     length = np.sqrt(((side / usual) ** 2).sum())
     if length == 0.0:
@@ -260,7 +267,7 @@ def _krylov(matrix, side, usual):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
+    """Return the coefficients of a step of size h: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -282,9 +289,9 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
-    (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (frames, DIM, *sizes).
 
+    x0 has the shape (DIM, *sizes).
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
     x, sites = _started(x0, parameters)
@@ -314,13 +321,13 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, in an array (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """Return pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), an array of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d7976c4f29e03d105886de0d13f0fdc0b9e71a3199203783e41469ad922b1118
+# body-sha256: eaaea5023cd75e4434b4e9c128cbe37608fa13f295d26475edbead5135342a92
 import numpy as np
 
 VERSION = "0.1.0"
@@ -28,18 +28,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("I1", "I2", "I3",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
+# The solver subtracts multiples of these Casimirs from the Hamiltonian; gauge() returns the factors.
 GAUGE = ("length",)
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -51,26 +51,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -89,7 +89,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -99,7 +99,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -460,11 +461,11 @@ CONTRACTING = 0.05  # the Jacobian is replaced if an iteration multiplies the re
 
 
 def _holds(coef, p, m, slope):
-    """Return for which members the Taylor series of a path satisfies dm/dt = pi(m) p at the point m, with dm/dt =
-    slope.
+    """Return for which members slope = pi(m) p up to rounding errors, at the end m of a path.
 
-    A series for which this fails only seems to have converged: it has gaps between its terms, as t + t**9, or extends
-    across the kink of an absolute value.
+    slope is the derivative dm/dt of the Taylor series of the path at m. If it differs from pi(m) p, the series only
+    seems to have converged: it has gaps between its terms, such as t + t**9, or extends across the kink of an absolute
+    value.
     """
     e = [m[:, i] for i in range(DIM)] + [None] * (84 - DIM)
     e[7] = p[:, 6] * e[5]
@@ -565,7 +566,7 @@ def _product(a, b, k):
 def _chain(a, d, k):
     """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'.
 
-    a are the coefficients of the argument, d those of f'(a).
+    The entries of a and d are coefficients of the series of a and f'(a).
     """
     return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
 
@@ -579,9 +580,10 @@ def _power(a, b, r, k):
 
 
 def _piece(coef, p, start):
-    """Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m = start, by its Taylor series; arrays (members, DIM).
+    """Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m = start, by its Taylor series.
 
-    Returns m(1) - start, the mean of m(t) - start, and for which members 30 terms sufficed.
+    Arrays have the shape (members, DIM). Returns m(1) - start, the mean of m(t) - start, and for which members
+    30 terms of the series sufficed.
     """
     s = [[start[:, i]] for i in range(DIM)] + [[] for _ in range(84 - DIM)]
     s[7].append(p[:, 6] * s[5][0] + 0.0)
@@ -763,10 +765,10 @@ def _piece(coef, p, start):
 
 
 def _path(coef, x, p):
-    """Return for the path dm/dt = pi(m) p from m = x, 0 <= t <= 1, its end minus x and its mean minus x.
+    """Return the end minus x and the mean minus x of the path dm/dt = pi(m) p, 0 <= t <= 1, which starts at m = x.
 
-    The path is cut into 1, 2, 4, ... pieces until the Taylor series of each piece converges; the third result is the
-    number of pieces computed. The values are NaN if the path is too long or leaves the domain of pi.
+    Both are NaN if the path is too long or leaves the domain of pi. The path is cut into 1, 2, 4, ... pieces until the
+    Taylor series of each piece converges. Also returns the number of pieces that were computed.
     """
     change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
@@ -788,8 +790,8 @@ def _path(coef, x, p):
 def _residual(coef, x, p):
     """Return the residual p - grad S_h(mean of the path) of the equation for the covector p of a stage.
 
-    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at x; S_h is the generating function. Further results are the change
-    of x along the path, an approximate Jacobian of the residual, and the number of pieces computed of the path.
+    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at m = x; S_h is the generating function. Also returns the end of the
+    path minus x, an approximate Jacobian of the residual, and the number of pieces of the path that were computed.
     """
     change, mean, pieces_used = _path(coef, x, p)
     slope, jacobian = _generate(coef, x + mean)
@@ -797,10 +799,10 @@ def _residual(coef, x, p):
 
 
 def _differences(coef, x, p, residual):
-    """Return the Jacobian of the residual by p, from differences, and the number of pieces computed of all paths.
+    """Return the Jacobian of the residual with respect to p, by differences, and the number of pieces of all paths.
 
-    This Jacobian serves for steps so large that iterations with the approximate Jacobian do not converge. It is NaN for
-    members whose paths cannot be followed.
+    This Jacobian is for steps so large that iterations with the approximate Jacobian do not converge. It is NaN for
+    members with a path that is too long or leaves the domain of pi.
     """
     jacobian, pieces_used = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
@@ -818,7 +820,7 @@ def _differences(coef, x, p, residual):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
+    """Return the solution of a linear system for each member. It is NaN if the matrix of the member is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -834,7 +836,8 @@ MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fr
 def _plausible(stage, x, end):
     """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
+    the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -848,7 +851,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
+    """Return the result of _attempt. Solutions that are not plausible get the status NO_CONVERGENCE."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -857,9 +860,10 @@ def _solved(stage, x, carry, prediction):
 def _attempt(coef, x, carry, p):
     """Make one stage: solve p = grad S_h(mean of the path) for the covector p, and move to the end of the path.
 
-    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at x; S_h is the generating function. Arrays are (members, DIM). A
-    step that needs more than MOST_PIECES pieces of paths is too large for a meaningful solution. Returns the new x, its
-    compensation term, p, and a status for each member, "" if it was solved.
+    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at m = x; S_h is the generating function. x, carry and p have the
+    shape (members, DIM); iterations start from p. A step that needs more than MOST_PIECES pieces of paths is too large for a
+    meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the equation
+    was solved.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -899,7 +903,7 @@ def _attempt(coef, x, carry, p):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    `memory` holds the covectors p of the last two steps, which predict the next.
+    `memory` holds the covectors p of the last two steps. They predict the next p by linear extrapolation.
     """
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
     predicted = memory[0].any(axis=-1)
@@ -912,9 +916,9 @@ def _advance(stage, x, carry, memory):
 
 
 def _choose_gauge(parameters, x):
-    """Return for each Casimir C the factor lambda that minimises |grad H - lambda grad C| at x: (members, factors).
+    """Return for each Casimir C the factor lambda that minimises |grad H - lambda grad C| at x.
 
-    Factors that are not finite are replaced by 0.
+    The result has the shape (members, factors). Factors that are not finite are replaced by 0.
     """
     products = _products(parameters, x)
     with np.errstate(all="ignore"):
@@ -954,8 +958,8 @@ def _products(parameters, x):
 def _coefficients(parameters, x, h, gauge):
     """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same coefficients.
+    The coefficients depend on parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if they are equal for all members.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -965,20 +969,21 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
+    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
+    before it subtracts them from H."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -986,7 +991,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -1003,10 +1008,10 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
+    step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 834931ad10376e81d08c2663bef71d890ecdd293ac9e5f6cbe6d4cd89518348b
+ * body-sha256: 0927b80c43fa415850afd27b9a447aacccb2318c2325f7c3dcce8627e7fe1c72
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -284,7 +284,7 @@ static void rigid_body_eliminate(const double matrix[9], const double side[3], d
     reciprocal[2] = t8;
 }
 
-/* The leading error vector pi grad S_3, as a function of the gauge (factors of Casimirs). */
+/* The leading error pi grad S_3 of a step of order 2, as a function of the factors of Casimirs (gauge). */
 static void rigid_body_guide(const rigid_body_params *params, const double gauge[1], const double x[3],
     double error[restrict 3])
 {
@@ -716,10 +716,11 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 /* ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ---- */
 enum {
     rigid_body_SAMPLES = 32, /* number of sample states along a short piece of the trajectory */
-    /* degree of the squared error in the factor of a Casimir, since S_3 is cubic in H */
+    /* degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H */
     rigid_body_DEGREE = 6,
-    rigid_body_SWEEPS = 4, /* largest number of rounds; a round optimises each factor once */
-    /* number of grids in the search for a factor; each is finer by the factor MESH than the one before */
+    /* largest number of rounds of the search; a round optimises each factor once */
+    rigid_body_SWEEPS = 4,
+    /* number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before */
     rigid_body_GRIDS = 3,
     rigid_body_FIRST_REACH = 24,  /* points of the first grid on each side of its centre */
     rigid_body_REACH_OF_GRID = 8, /* points of later grids on each side of the best point so far */

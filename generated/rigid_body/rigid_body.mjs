@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3a7bfcae02da4901f44a7270ccb21c31dea05ea87bfa6b952dea0ef494a686e3
+ * body-sha256: eca3521833e85760ee5a5d6b44a718917b5149e2b5bc479e284e4a07416cc581
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -43,22 +43,22 @@ const DEFAULT_PARAMETERS = Object.freeze({
 /** Parameters that must be positive. */
 const POSITIVE = ["I1", "I2", "I3"];
 
-/** Casimirs of which the solver subtracts multiples from H. */
+/** The solver subtracts multiples of these Casimirs from H. */
 const GAUGE = Object.freeze(["C"]);
 
-/** A step of size h is the composition of stages of these fractions of h. */
+/** A step of size h is a sequence of stages, whose sizes are these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Number of coefficients: functions of parameters and step size. */
+/** Number of coefficients. They do not depend on the state. */
 const COEFFICIENTS = 35;
 
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Iterations end if the next correction of y is expected to be smaller than this, relative to y. */
+/** The iteration for y ends if its next correction is expected to be smaller than this, relative to y. */
 const TOLERANCE = 1e-20;
 
-/** Value at s of the polynomial with these coefficients, the constant first. */
+/** Value at s of the polynomial with these coefficients; coefficients[k] belongs to s^k. */
 function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
@@ -369,7 +369,7 @@ function linearise(coef, y, displacement, increment, jacobian, incrementJacobian
   incrementJacobian[8] = t63 - t61;
 }
 
-/** The leading error vector pi grad S_3, as a function of the gauge (factors of Casimirs). */
+/** The leading error pi grad S_3 of a step of order 2, as a function of the factors of Casimirs (gauge). */
 function guide(params, gauge, x, error) {
   const x1 = x[0];
   const x2 = x[1];
@@ -470,16 +470,16 @@ const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
 const REACH = 4.0;
-/** Number of stored differences; differences of higher order would amplify rounding errors. */
+/** Number of stored differences of solutions; higher differences would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 /** Number of sample states along a short piece of the trajectory. */
 const SAMPLES = 32;
-/** Degree of the squared error in the factor of a Casimir, since S_3 is cubic in H. */
+/** Degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H. */
 const DEGREE = 6;
-/** Largest number of rounds; a round optimises each factor once. */
+/** Largest number of rounds of the search; a round optimises each factor once. */
 const SWEEPS = 4;
-/** Number of grids in the search for a factor; each is finer by the factor MESH than the one before. */
+/** Number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before. */
 const GRIDS = 3;
 /** Points of the first grid on each side of its centre. */
 const FIRST_REACH = 24;
@@ -494,7 +494,7 @@ const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -502,7 +502,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -517,7 +517,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -525,7 +525,10 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -534,9 +537,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/**
- * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
- */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -553,8 +554,9 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params gauge".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
- * where required, and unless the coefficients of a very small step are finite.
+ * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown names,
+ * for values that are not finite, and for values that are not positive where this is required. The
+ * coefficients of a very small step must also be finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -598,13 +600,13 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** The Casimirs in GAUGE, times these factors, are subtracted from H. */
+  /** gauge[k] times Casimir k of GAUGE is subtracted from H. */
   gauge;
-  /** Coefficients of each stage: functions of parameters and step size. */
+  /** For each stage, an array of coefficients. They depend on parameters and step size. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -614,8 +616,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
-   * @param {ArrayLike<number>} [options.gauge] the Casimirs, times these factors, are subtracted from H;
-   *   by default the factors follow from x0. All steps with the same factors have the same Hamiltonian
+   * @param {ArrayLike<number>} [options.gauge] gauge[k] times Casimir k of GAUGE is subtracted from H;
+   *   by default, gauge is chosen for x0. With a fixed gauge, a step is a Poisson map
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);
@@ -640,7 +642,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -660,8 +663,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -673,12 +676,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state.
+   * Return an independent solver with the same state, time and parameters.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined if there is no such field
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -687,8 +690,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -696,15 +699,15 @@ export class Solver {
   setParameters(changes) {
     const params = admitted({ ...this.params, ...changes });
     this.params = params;
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   /**
-   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Replace the state by x between steps; the time and the parameters stay the same. If x is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; the Casimirs then change, too
    * @returns {this}
    */
   setState(x) {
@@ -713,7 +716,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
+   * Add a change, such as an impulse, to the state between steps. If the change or the new state is not
+   * admissible, throws StepError and changes nothing.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -740,16 +744,17 @@ export class Solver {
   }
 
   /**
-   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * Make count steps from each of many initial states. A trajectory ends before the first step that fails.
    * Each state has its own gauge unless options.gauge is given.
-   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
-   * length.
+   * h and parameters may be arrays with one number for each initial state. Throws StepError if an array has
+   * another length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states
    * @param {number | ArrayLike<number>} h step size
    * @param {number} count number of steps
    * @param {object} [options] as in the constructor, without x0
-   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each trajectory, and its
+   *   status: "OK", or the status of the step that failed
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -813,7 +818,7 @@ function prepareStage({ params, gauge }, h, table) {
   prepare(params, gauge, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 function prepareProbe(params, table) {
   prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
 }
@@ -844,7 +849,7 @@ function restoreState(solver, copies) {
 
 /**
  * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|; NaN or infinite if a component of the correction is.
+ * |y_j|. It is NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -867,10 +872,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
- * a status. The effect of the last correction on the increment is added to first order, without another
- * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
- * the square of the last one.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x. Returns a
+ * status. Iterations start from the predicted y. The next correction is about the square of the last one;
+ * iterations end when it is expected to be below TOLERANCE. The last correction of y changes the increment.
+ * This change is added to first order, without another evaluation.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -903,7 +908,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** Make one stage of a step; returns a status. */
+/** Make one stage of a step, and return its status. */
 function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
@@ -913,7 +918,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages, when the state of a solver changes to x. */
+/** Adapt the predictors of all stages when the state of a solver is changed to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -926,8 +931,9 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
- * solution. It affects the speed only.
+ * Predictor of a stage. It stores the last solution y, and backward differences of earlier solutions. The sum
+ * of some of these entries predicts the next solution. Iterations start from the prediction, so a predictor
+ * affects the speed only.
  */
 class History {
   /** Number of stored entries: the last solution and its differences. */
@@ -943,7 +949,8 @@ class History {
   }
 
   /**
-   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
+   * The state was changed from `from` to `to`: add this change to the last solution. The differences stay the
+   * same.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -961,8 +968,8 @@ class History {
    * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
-   *     that the iteration could find an unrelated one
+   * @returns {boolean} false if no solution is known, or if the prediction is too far from the last
+   *     solution: the iteration might then find an unrelated solution
    */
   predict(value) {
     let distance = 0;
@@ -978,8 +985,8 @@ class History {
   }
 
   /**
-   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
-   * order with the smallest error is used next.
+   * Update the predictor with a solution. The new k-th difference is the error that a prediction of order k
+   * would have had. The next prediction has the order with the smallest error.
    *
    * @param {Float64Array} value
    */
@@ -1010,8 +1017,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
- * is too large may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. If a step is too large, its
+ * equation may have solutions far away, at another energy, that have nothing to do with the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -1041,7 +1048,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
+ * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -1056,19 +1063,19 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-/** Contribution of noise to the size of an increment of the state: 0, since there is no noise. */
+/** Size of the increment of the state by noise: 0, since there is no noise. */
 function sizeOfNoise() {
   return 0;
 }
 
-/** Set the gauge of a solver: from its options, or if they have none, chosen at the initial state. */
+/** Set the gauge of a solver to the one in its options, or choose a gauge for the initial state. */
 function takeGauge(solver, { gauge }) {
   solver.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(solver.params, solver.x);
 }
 
-// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
+// ---- The choice of the gauge: the factors of Casimirs in H - sum of gauge[c] C_c ----
 
-/** Direction of the vector field at a point, a unit vector; 0 at equilibria. */
+/** The vector field at a point, divided by the sum of its |components|; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -1076,13 +1083,14 @@ function direction(params, at) {
   return slope.map((value) => value / speed);
 }
 
+/** The sum of the magnitudes of values. */
 function total(values) {
   return values.reduce((sum, value) => sum + Math.abs(value), 0);
 }
 
 /**
- * Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in
- * phase space: with steps of equal time, a slow state would leave its neighbourhood.
+ * Return states on a short piece of the trajectory from x, by a Runge-Kutta method. Its steps have equal
+ * lengths in phase space, so the piece has the same length for slow and fast motions.
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
@@ -1097,8 +1105,8 @@ function sampled(params, x) {
 }
 
 /**
- * The leading error of the method: the sum of |pi grad S_3|^2 over the samples. S_3 is the first error
- * term in the Hamiltonian that steps follow (the modified Hamiltonian).
+ * The sum of |pi grad S_3|^2 over the samples. h^3 pi grad S_3 is the leading error of a step of order 2. At
+ * higher orders, too, a small |pi grad S_3| usually means a small error.
  */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
@@ -1111,8 +1119,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error at gauge[c] + t width. The error is a polynomial in gauge[c], given by forward
- * differences.
+ * Value of the error if gauge[c] is increased by t width (see leastOnLine). The error is a polynomial in t of
+ * degree DEGREE, given by its forward differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
@@ -1121,8 +1129,8 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * The shift of gauge[c], in units of width, that minimises the error, by a search on successively finer
- * grids.
+ * Return the change of gauge[c], in units of width, that minimises the error. The minimum is searched on a
+ * grid, and then on finer grids around the best point.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
@@ -1152,9 +1160,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c] grad
- * C_c. All factors are 0 if the error that they give is not finite.
+ * Return the gauge: factors of the Casimirs C_c that minimise gaugeError on a short piece of the trajectory
+ * from x. The search starts from the factors with the least |grad H - gauge[c] grad C_c|, and then optimises
+ * one factor after the other. If the resulting error is not finite, all factors are 0.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x
@@ -1188,8 +1196,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small holds the compensation term and other terms
- * that are small compared with change.
+ * Add change + small to the state by compensated summation. small contains the compensation term, and other
+ * terms that are much smaller than change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
@@ -1210,14 +1218,14 @@ function advance({ x, carry }, change, small) {
   return true;
 }
 
-/** The smallest normal number: avoids division by zero. */
+/** The smallest normal number. It is added to divisors that may be 0. */
 const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.
+ * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
- * @param {Float64Array} side becomes the solution
+ * @param {Float64Array} side is overwritten with the solution
  * @returns {boolean} false if the matrix is singular
  */
 function solve(matrix, side) {

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2c522971a5a7c4cce04773e1db468721b21057a70b506d6b0e658648119d82d5
+# body-sha256: 66b0d75b731430e6be957b77bd83d167b525b7f532a9c9c14e4bd026b221c37c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -25,18 +25,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("I1", "I2", "I3",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
+# The solver subtracts multiples of these Casimirs from the Hamiltonian; gauge() returns the factors.
 GAUGE = ("C",)
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -48,26 +48,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -86,7 +86,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -96,7 +96,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -450,7 +451,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
+    """Return the solution of a linear system for each member. It is NaN if the matrix of the member is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -466,7 +467,8 @@ MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fr
 def _plausible(stage, x, end):
     """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
+    the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -480,7 +482,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
+    """Return the result of _attempt. Solutions that are not plausible get the status NO_CONVERGENCE."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -501,11 +503,12 @@ def _size(y, delta):
 
 
 def _attempt(coef, x, carry, y):
-    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
+    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x.
 
-    The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
-    its compensation term, y, and a status for each member, "" if it was solved.
+    x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
+    the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
+    member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -538,7 +541,8 @@ def _attempt(coef, x, carry, y):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    y is the solution of the stage. `memory` holds the offsets y - x of the last two steps, which predict the next.
+    `memory` holds the offsets y - x in the last two steps, where y is the solution of the stage. These offsets predict
+    the next one by linear extrapolation.
     """
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
@@ -552,9 +556,9 @@ def _advance(stage, x, carry, memory):
 
 
 SAMPLES = 32  # number of sample states along a short piece of the trajectory
-DEGREE = 6  # degree of the squared error in the factor of a Casimir, since S_3 is cubic in H
-SWEEPS = 4  # largest number of rounds; a round optimises each factor once
-GRIDS = 3  # number of grids in the search for a factor; each is finer by the factor MESH than the one before
+DEGREE = 6  # degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H
+SWEEPS = 4  # largest number of rounds of the search; a round optimises each factor once
+GRIDS = 3  # number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before
 FIRST_REACH = 24  # points of the first grid on each side of its centre
 REACH_OF_GRID = 8  # points of later grids on each side of the best point so far
 MESH = 0.125  # distance of the points of the first grid, in units of the width |grad H|/|grad C|
@@ -563,11 +567,10 @@ CLOSE_CALL = 1e-12  # errors that differ by less than this fraction of the sum o
 
 
 def _line(error_of, gauge, c, width):
-    """Return the error as a function of factor c of the gauge, and the sum of the values that determine this function.
+    """Return forward differences of the error as a function of factor c of the gauge, and the sum of its values.
 
-    The function is given by forward differences (DEGREE + 1, members) of its values at gauge[c] + (j - DEGREE / 2)
-    width, j = 0 ... DEGREE. These differences determine the error: it is a sum of squares of terms that are cubic in H,
-    so a polynomial of degree six in each factor.
+    The error is computed at gauge[c] + (j - DEGREE / 2) width for j = 0 ... DEGREE. It is a polynomial of this degree
+    in the factor, so its differences, an array (DEGREE + 1, members), determine it.
     """
     shifted, errors = gauge.copy(), []
     for j in range(DEGREE + 1):
@@ -577,9 +580,10 @@ def _line(error_of, gauge, c, width):
 
 
 def _least_on_line(difference, size):
-    """Return the shift of a factor of the gauge that minimises the error, in units of width.
+    """Return the change of a factor of the gauge, in units of width, that minimises the error.
 
-    The forward differences give the error as a polynomial; it is searched on successively finer grids.
+    `difference` and `size` are what _line returns. The minimum is searched on a grid, and then on finer grids around
+    the best point.
     """
 
     def value(t):
@@ -602,7 +606,7 @@ def _least_on_line(difference, size):
 
 
 def _direction(parameters, y):
-    """Return the direction of the motion at states y, as unit vectors; 0 at an equilibrium."""
+    """Return the vector field at states y, divided by the sum of its |components|; 0 at an equilibrium."""
     slope = _vector_field(parameters, y)
     return slope / (np.abs(slope).sum(axis=-1, keepdims=True) + np.finfo(float).tiny)
 
@@ -610,7 +614,8 @@ def _direction(parameters, y):
 def _samples(parameters, x, count=SAMPLES):
     """Return states on a short piece of each trajectory from x, by a Runge-Kutta method.
 
-    Its steps have equal lengths in phase space: with steps of equal time, a slow state would leave its neighbourhood.
+    The steps of the method have equal lengths in phase space, so the piece has the same length for slow and fast
+    motions.
     """
     length = SAMPLE_LENGTH * np.abs(x).sum(axis=-1, keepdims=True)
     points = [x]
@@ -622,11 +627,12 @@ def _samples(parameters, x, count=SAMPLES):
 
 
 def _choose_gauge(parameters, x):
-    """Return factors lambda of Casimirs that minimise the leading error along a short piece of each trajectory.
+    """Return factors of Casimirs that minimise the sum of |pi grad S_3|^2 over a short piece of each trajectory.
 
-    The result has shape (members, number of factors). The factors are optimised one after the other, starting from the
-    least-squares solution of grad H = sum of lambda grad C. The factors of a member are 0 if the error that they give
-    is not finite.
+    h^3 pi grad S_3 is the leading error of a step of order 2. At higher orders, too, a small |pi grad S_3| usually
+    means a small error. The result has the shape (members, factors). The search starts from the factors lambda with the least
+    |grad H - lambda grad C|, and then optimises one factor after the other. If the resulting error of a member is not
+    finite, its factors are 0.
     """
     points = _samples(parameters, x)
     sums = _products(parameters, points).sum(axis=0)
@@ -646,7 +652,8 @@ def _choose_gauge(parameters, x):
 
 
 def _guide(parameters, gauge, x):
-    """The leading error vector pi grad S_3, as a function of the gauge (factors of Casimirs)."""
+    """The leading error pi grad S_3 of a step of order 2, as a function of the factors of Casimirs
+    (gauge)."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -704,8 +711,8 @@ def _products(parameters, x):
 def _coefficients(parameters, x, h, gauge):
     """Return the data of each stage of a step: its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
-    (coefficients, 1) if all members have the same coefficients.
+    The coefficients depend on parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if they are equal for all members.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -715,20 +722,21 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
+    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
+    before it subtracts them from H."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -736,7 +744,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -753,10 +761,10 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
+    step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

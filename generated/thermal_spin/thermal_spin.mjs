@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 032154eb0da80120d29e5466331c30ec0079c062523634db548f889bc1f9d830
+ * body-sha256: de6f73887280e11e4f48e128085f69dad1ecec0c47875402f3af47519a250b49
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -48,24 +48,24 @@ const DEFAULT_PARAMETERS = Object.freeze({
 /** Parameters that must be positive. */
 const POSITIVE = ["T", "damping_rate"];
 
-/**
- * Names of the sources of noise; number of increments that each source has in a step, and that all have
- * together; the bound at which normal variates are truncated.
- */
+/** Names of the sources of noise. */
 const SOURCES = Object.freeze(["bath_x", "bath_y", "bath_z"]);
+/** Number of increments of each source of noise in a step. */
 const PARTS = 1;
+/** Number of increments of all sources of noise in a step. */
 const DRAWS = 3;
+/** Normal variates are truncated at this magnitude. */
 const BOUND = 6.0;
 
-/** A step of size h is the composition of stages of these fractions of h. */
+/** A step of size h is a sequence of stages, whose sizes are these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Midpoint of each stage, as a fraction of the step, at which time-dependent coefficients are evaluated. */
+/** Midpoint of each stage, as a fraction of the step. Time-dependent coefficients are evaluated there. */
 const MIDDLES = [0.5];
 
 /**
- * Number of coefficients that depend on parameters and step size only; they are followed by the coefficients
- * that also depend on the step.
+ * Number of coefficients that depend on parameters and step size only. They stand before the coefficients
+ * that also depend on time or noise.
  */
 const PREPARED = 7;
 
@@ -75,10 +75,10 @@ const COEFFICIENTS = 13;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Iterations end if the next correction of y is expected to be smaller than this, relative to y. */
+/** The iteration for y ends if its next correction is expected to be smaller than this, relative to y. */
 const TOLERANCE = 1e-20;
 
-/** Value at s of the polynomial with these coefficients, the constant first. */
+/** Value at s of the polynomial with these coefficients; coefficients[k] belongs to s^k. */
 function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
@@ -289,12 +289,12 @@ const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
 const REACH = 4.0;
-/** Number of stored differences; differences of higher order would amplify rounding errors. */
+/** Number of stored differences of solutions; higher differences would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -302,7 +302,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -317,7 +317,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -325,7 +325,10 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -334,9 +337,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/**
- * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
- */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -353,8 +354,9 @@ const number = new Float64Array(1);
 const OPTIONS = "x0 params seed member step0".split(" ");
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
- * where required, and unless the coefficients of a very small step are finite.
+ * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown names,
+ * for values that are not finite, and for values that are not positive where this is required. The
+ * coefficients of a very small step must also be finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -390,7 +392,7 @@ export class Solver {
   carry = new Float64Array(DIM);
   /** Time since the start. */
   t = 0;
-  /** The random numbers of a step are a function of seed, member and step0 + steps. */
+  /** The random numbers of a step depend on seed, member and step0 + steps. */
   seed = 0;
   member = 0;
   step0 = 0;
@@ -404,11 +406,11 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size first, then of noise or time. */
+  /** For each stage, an array of coefficients; the last ones depend on noise or time. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -419,7 +421,7 @@ export class Solver {
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
    * @param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default
-   * @param {number} [options.member] member of an ensemble, 32 bits, 0 by default
+   * @param {number} [options.member] number of the trajectory, 32 bits, 0 by default
    * @param {number} [options.step0] number of steps made before x0, 0 by default
    */
   constructor(options = {}) {
@@ -445,7 +447,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @param {ArrayLike<number>} [dw] increments of the noise; random ones by default
@@ -468,8 +471,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -481,12 +484,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state.
+   * Return an independent solver with the same state, time and parameters.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined if there is no such field
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -496,8 +499,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -505,15 +508,15 @@ export class Solver {
   setParameters(changes) {
     const params = admitted({ ...this.params, ...changes });
     this.params = params;
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   /**
-   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Replace the state by x between steps; the time and the parameters stay the same. If x is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; the Casimirs then change, too
    * @returns {this}
    */
   setState(x) {
@@ -522,7 +525,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
+   * Add a change, such as an impulse, to the state between steps. If the change or the new state is not
+   * admissible, throws StepError and changes nothing.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -549,15 +553,17 @@ export class Solver {
   }
 
   /**
-   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
-   * length.
+   * Make count steps from each of many initial states. A trajectory ends before the first step that fails.
+   * h and parameters may be arrays with one number for each initial state. Throws StepError if an array has
+   * another length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states
    * @param {number | ArrayLike<number>} h step size
    * @param {number} count number of steps
-   * @param {object} [options] as in the constructor, without x0; member is the number of the first state
-   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
+   * @param {object} [options] as in the constructor, without x0; member is the number of the first
+   *   trajectory
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each trajectory, and its
+   *   status: "OK", or the status of the step that failed
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -599,7 +605,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field sigma pi(x) grad g(x) of each source of noise, one after the other. */
+  /** For each source of noise with the Hamiltonian g and the amplitude sigma: sigma pi(x) grad g(x). */
   noiseFields(x = this.x, t = this.t) {
     const out = new Float64Array(SOURCES.length * DIM);
     noiseFieldsAt(this.params, t, x, out);
@@ -629,7 +635,7 @@ function prepareStage({ params }, h, table) {
   prepare(params, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
@@ -660,7 +666,7 @@ function restoreState(solver, copies) {
 
 /**
  * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|; NaN or infinite if a component of the correction is.
+ * |y_j|. It is NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -683,10 +689,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
- * a status. The effect of the last correction on the increment is added to first order, without another
- * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
- * the square of the last one.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x. Returns a
+ * status. Iterations start from the predicted y. The next correction is about the square of the last one;
+ * iterations end when it is expected to be below TOLERANCE. The last correction of y changes the increment.
+ * This change is added to first order, without another evaluation.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -719,7 +725,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** Make one stage of a step; returns a status. */
+/** Make one stage of a step, and return its status. */
 function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
@@ -736,7 +742,7 @@ function upper(a, b) {
 
 /**
  * Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
- * (2011): four random words, as a function of a counter of four words and a key of two.
+ * (2011). Returns four random words, as a function of a counter of four words and a key of two words.
  */
 function philox(counter, key) {
   let [a, b, c, d] = counter;
@@ -762,7 +768,7 @@ function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Two standard normal variates (Box and Muller) of magnitude at most BOUND, from a counter of four words. */
+/** Return two standard normal variates by the method of Box and Muller, truncated at magnitude BOUND. */
 function twoNormals(counter, key) {
   const [a, b, c, d] = philox(counter, key);
   const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
@@ -771,8 +777,8 @@ function twoNormals(counter, key) {
 }
 
 /**
- * The values of seed, member and step0, which select random numbers, from the options of a solver. Throws
- * StepError for values that are not admissible.
+ * Return seed, member and step0 from the options of a solver; random numbers depend on them. Throws StepError
+ * if a value is not admissible.
  */
 function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
@@ -790,7 +796,7 @@ function takeDraws(solver, options) {
 
 // ---- Noise ----
 
-/** Compute normal variates of mean 0 and variance 1 for a step. */
+/** Compute the random numbers of a step: independent normal variates of mean 0 and variance 1. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -800,9 +806,9 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the noise in the next step: to `increments`, or if this is undefined, to random ones.
+ * Set the increments of the noise in the next step to `increments`. If this is undefined, they are random.
  *
- * @returns {boolean} false if an increment is not finite or missing
+ * @returns {boolean} false unless `increments` has DRAWS numbers, and all are finite
  */
 function draw(solver, increments) {
   const { dw, seed, member, step0, steps, h } = solver;
@@ -834,7 +840,7 @@ function refreshAt(row, t, dw, out) {
   refresh(row, dw, out);
 }
 
-/** For the stages of the next step, compute the coefficients that differ from step to step. */
+/** For each stage of the next step, compute the coefficients that differ from step to step. */
 function renew({ coef, t, h, dw }) {
   coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
 }
@@ -844,7 +850,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages, when the state of a solver changes to x. */
+/** Adapt the predictors of all stages when the state of a solver is changed to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -857,8 +863,9 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
- * solution. It affects the speed only.
+ * Predictor of a stage. It stores the last solution y, and backward differences of earlier solutions. The sum
+ * of some of these entries predicts the next solution. Iterations start from the prediction, so a predictor
+ * affects the speed only.
  */
 class History {
   /** Number of stored entries: the last solution and its differences. */
@@ -874,7 +881,8 @@ class History {
   }
 
   /**
-   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
+   * The state was changed from `from` to `to`: add this change to the last solution. The differences stay the
+   * same.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -892,8 +900,8 @@ class History {
    * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
-   *     that the iteration could find an unrelated one
+   * @returns {boolean} false if no solution is known, or if the prediction is too far from the last
+   *     solution: the iteration might then find an unrelated solution
    */
   predict(value) {
     let distance = 0;
@@ -909,8 +917,8 @@ class History {
   }
 
   /**
-   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
-   * order with the smallest error is used next.
+   * Update the predictor with a solution. The new k-th difference is the error that a prediction of order k
+   * would have had. The next prediction has the order with the smallest error.
    *
    * @param {Float64Array} value
    */
@@ -941,8 +949,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
- * is too large may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. If a step is too large, its
+ * equation may have solutions far away, at another energy, that have nothing to do with the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -972,7 +980,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
+ * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -989,7 +997,7 @@ function retried(solver, stage, attempt) {
 
 const fields = new Float64Array(SOURCES.length * DIM);
 
-/** Contribution of noise to the size of the increment of the state in a step: the sum of |dw| |field|. */
+/** Size of the increment of the state by noise in a step: the sum of |dw| |field| over all sources. */
 function sizeOfNoise({ params, t, x, dw }) {
   noiseFieldsAt(params, t, x, fields);
   return fields.reduce((sum, field, k) => sum + Math.abs(dw[Math.floor(k / DIM)] * field), 0);
@@ -1001,8 +1009,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small holds the compensation term and other terms
- * that are small compared with change.
+ * Add change + small to the state by compensated summation. small contains the compensation term, and other
+ * terms that are much smaller than change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
@@ -1023,14 +1031,14 @@ function advance({ x, carry }, change, small) {
   return true;
 }
 
-/** The smallest normal number: avoids division by zero. */
+/** The smallest normal number. It is added to divisors that may be 0. */
 const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.
+ * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
- * @param {Float64Array} side becomes the solution
+ * @param {Float64Array} side is overwritten with the solution
  * @returns {boolean} false if the matrix is singular
  */
 function solve(matrix, side) {

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: bbb19c3231ae72352d531a65e991a80d08894173831fdf23ce86af9460f6f863
+# body-sha256: 43cd482fbd0777cc1997f49aa4b518ff24733871b1319e9b93a249467b4fb19f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,18 +30,18 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("T", "damping_rate",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
+# The solver subtracts multiples of these Casimirs from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
-# A step of size h is composed of steps of these fractions of h.
+# A step of size h is a sequence of stages, whose sizes are these fractions of h.
 FRACTIONS = (1.0,)
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of
-    the members that failed; states: the rows computed so far, the last good state included.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE, SINGULAR or NOT_FINITE; members: indices of the
+    members that failed; states: the result of integrate() for the steps before this one.
     """
 
     def __init__(self, step, status, members, states):
@@ -53,26 +53,26 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
+    """Return the columns of coefficients for some members. A single column, for all members, is returned unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
+    """Return the data of a stage for some members. Data that hold for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
 
 
 def _table(rows):
-    """Return rows as an array (rows, members), or (rows, 1) if all rows are numbers."""
+    """Return rows as an array of shape (rows, members). If all rows are numbers, the shape is (rows, 1)."""
     zeros = np.zeros(max((np.size(row) for row in rows), default=1))
     return np.array([row + zeros for row in rows]).reshape(len(rows), len(zeros))
 
 
 def _filled(like, values):
-    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
-    repeated."""
+    """Return an array with the values along its last axis. Its leading axes are those of `like`; numbers are repeated
+    along them."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -91,7 +91,7 @@ PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step s
 
 
 def _numbers(values):
-    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
+    """Return values as an array of floating-point numbers. Raises ValueError if a value is too large."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -101,7 +101,8 @@ def _numbers(values):
 def _values(parameters):
     """Return all parameters by name, with defaults for missing ones.
 
-    The values are numbers of NumPy: division by 0 gives infinity, where a Python float would raise an error.
+    The values are numbers or arrays of NumPy. Division by 0 then gives infinity; with Python numbers, it would
+    raise an error.
     """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
@@ -292,7 +293,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
+    """Return the solution of a linear system for each member. It is NaN if the matrix of the member is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -308,7 +309,8 @@ MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fr
 def _plausible(stage, x, end):
     """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
+    the motion.
     """
     _, parameters, h, dw = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -324,7 +326,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
+    """Return the result of _attempt. Solutions that are not plausible get the status NO_CONVERGENCE."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -345,11 +347,12 @@ def _size(y, delta):
 
 
 def _attempt(coef, x, carry, y):
-    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
+    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x.
 
-    The effect of the last correction on the increment is added to first order. So iterations end when the next
-    correction is expected to be below 1e-20; its size is about the square of the last one. Returns the new x,
-    its compensation term, y, and a status for each member, "" if it was solved.
+    x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
+    the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
+    member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -382,22 +385,23 @@ def _attempt(coef, x, carry, y):
 def _advance(stage, x, carry, memory):
     """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    y is the solution of the stage, and `memory` holds its last offset y - x. Nothing is predicted from it, since steps
-    with noise cannot be predicted.
+    `memory` holds the last offset y - x, where y is the solution of the stage. The solution is not predicted, since
+    noise is random: iterations start from y = x.
     """
     following, rest, y, status = _solved(stage, x, carry, x)
     return following, rest, (y - x, y - x), status
 
 
 def _choose_gauge(parameters, x):
-    """Return an array without columns: this solver subtracts no Casimirs from H."""
+    """Return an array (members, 0): this solver subtracts no Casimirs from H."""
     return np.zeros((len(x), 0))
 
 
-# Names of the sources of noise; the number of increments in a step; the number of parts of a step with separate
-# increments; the bound at which normal variates are truncated, since rare large ones would make steps fail.
+# Names of the sources of noise.
 SOURCES = ("bath_x", "bath_y", "bath_z",)
+# Number of increments of each source of noise in a step.
 PARTS = 1
+# Normal variates are truncated at this magnitude, since rare large ones would make steps fail.
 BOUND = 6.0
 
 
@@ -423,9 +427,9 @@ def _unit(high, low):
 
 
 def _two_normals(seed, counter):
-    """Return two arrays of independent standard normal variates, by the method of Box and Muller.
+    """Return two arrays of independent standard normal variates, truncated at BOUND, by the method of Box and Muller.
 
-    The random numbers are a function of the seed and of a counter of four words.
+    The variates depend on the seed and on a counter of four words.
     """
     a, b, c, d = _philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
     radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
@@ -434,7 +438,7 @@ def _two_normals(seed, counter):
 
 
 def _normals(seed, members, step):
-    """Return normal variates of mean 0 and variance 1 for a step: (increments in a step, members)."""
+    """Return independent normal variates of mean 0 and variance 1 for a step, in an array (increments, members)."""
     count, word, normals = PARTS * len(SOURCES), 0xFFFFFFFF, []
     for pair in range((count + 1) // 2):
         counter = [np.full(members.shape, w, dtype=np.uint64) for w in (step & word, step >> 32, 0, pair)]
@@ -446,9 +450,10 @@ def _normals(seed, members, step):
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
     """Return a function that maps the number of steps done to the increments of the noise in the next step.
 
-    Its result has the shape (increments, members). Random increments depend only on seed, on the numbers of the members
-    (member is the number of the first member, or an array with all), and on the number of the step, step0 + done.
-    `increments`, if not None, are used instead: (steps, increments) for all members, or (steps, members, increments).
+    The increments have the shape (increments, members). Random ones depend on seed, on the number of the member, and on
+    the number of the step: step0 + steps done. member is the number of the first member, or an array with the numbers
+    of all members. `increments` replaces the random increments; its shape is (steps, increments), for all members, or
+    (steps, members, increments).
     """
     members = np.arange(count) + member if np.ndim(member) == 0 else np.asarray(member)
     if increments is None:
@@ -461,8 +466,8 @@ def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
 def _coefficients(parameters, x, h, gauge):
     """Return the data of the only stage of a step: coefficients, the parameters, and the step size.
 
-    The coefficients are those that depend on neither state, time nor noise. They form an array (coefficients, members),
-    or (coefficients, 1) if all members have the same coefficients.
+    The coefficients are those that depend on neither time nor noise. They form an array (coefficients, members), or
+    (coefficients, 1) if they are equal for all members.
     """
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
@@ -470,29 +475,29 @@ def _coefficients(parameters, x, h, gauge):
 def _renewed(stage, t, h, dw):
     """Return the data of the stage in the step of size h that begins at the time t.
 
-    The data are all coefficients, (coefficients, members), the parameters, the step size,
-    and the increments dw of the noise in the step, (increments, members).
-    `stage` is what _coefficients returns.
+    The argument `stage` is what _coefficients returns for the stage. The result has all coefficients, the parameters,
+    the step size, and the increments dw of the noise, an array (increments, members).
     """
     coef, parameters, step = stage
     return _table([*coef, *_refresh(coef, dw)]), parameters, step, dw
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
+    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
+    before it subtracts them from H."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
-    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
-    fails."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if the
+    step fails."""
     return integrate(x, h, 1, seed=seed, member=member, step0=step0, increments=increments, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return a number unchanged, and an array with one number for each member of x as an array (members,).
+    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """
@@ -500,7 +505,7 @@ def _of_members(value, x):
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
+    """Return x0, h and all parameters as arrays. Raises ValueError if an argument is not allowed."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")
@@ -517,13 +522,12 @@ def _checked(x0, h, steps, stride, parameters):
 def integrate(x0, h, steps, stride=1, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
     """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (rows, ..., DIM).
 
-    x0 has shape (..., DIM): each index of the leading axes is a member, a trajectory of its own. h and parameters
-    may be arrays with one number for each member. The random
-    numbers depend on seed, member and number of the step. member is the number of the first member, or an array with
-    the numbers of all members; the first step has the number step0. If increments are given, with the shape (steps,
-    increments) or (steps, members, increments), they replace random increments of the noise.
-    gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge.
+    x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
+    may be arrays with one number for each member.
+    Random numbers depend on seed, on the number of the member, and on the number of the step. member is the number of
+    the first member, or an array with the numbers of all members; step0 is the number of the first step. `increments`
+    replaces the random increments of the noise. Its shape is (steps, increments) or (steps, members, increments).
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)
@@ -610,7 +614,10 @@ def casimirs(x, **parameters):
 
 
 def noise_fields(x, **parameters):
-    """Return the vector field sigma pi(x) grad g(x) of each source of noise: (..., DIM) -> (..., len(SOURCES), DIM)."""
+    """Return sigma pi(x) grad g(x) for each source of noise: (..., DIM) -> (..., len(SOURCES), DIM).
+
+    g is the Hamiltonian of the source, and sigma its amplitude.
+    """
     x, values = np.asarray(x, dtype=float), _values(parameters)
     with np.errstate(all="ignore"):
         return _noise_fields(values, x).reshape(x.shape[:-1] + (len(SOURCES), DIM))

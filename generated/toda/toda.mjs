@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e62e74155f5394ef654c743787690ce0161da99eb10239e96c9379c0c2e3eba0
+ * body-sha256: 1d3f2c91f62d0e72ba5ade569c6d6a1d88f92fe60596ed3e9697ac6e14ed2a56
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -28,7 +28,7 @@ const AXES = Object.freeze(["i"]);
 const COORDINATES = Object.freeze(["a", "b"]);
 const CASIMIRS = Object.freeze(["momentum", "length"]);
 
-/** The kind of each Casimir: a value at each site ("sites"), or the "sum" or "product" over all sites. */
+/** For each Casimir: "sites" if each site has one, or "sum" or "product" of the values of all sites. */
 const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 
 /**
@@ -37,25 +37,28 @@ const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 const DEFAULT_PARAMETERS = Object.freeze({
 });
 
-/** Parameters that must be positive, and those that may have a value at each site. */
+/** Parameters that must be positive. */
 const POSITIVE = [];
+/** Parameters that may have a value at each site. */
 const AT_SITES = [];
 
-/** Along each axis: whether the ends are open, the smallest size, and a number that must divide the size. */
+/** Whether the ends of the lattice are open, along each axis. */
 const OPEN = [false];
+/** Smallest number of sites along each axis. */
 const LEAST = [2];
+/** Numbers that must divide the number of sites along each axis. */
 const PERIODS = [1];
 
-/** Offsets, along the axes, of the neighbours of a site that the functions of the model read. */
+/** Offsets, along the axes, of the neighbours of a site that the functions of the system read. */
 const NEAR = [[-1], [1]];
 
 /**
- * Near open ends, some terms of H have no place. For each kind of such terms, the smallest and largest offset
- * of its sites along each axis.
+ * A term of H is left out if one of its sites would lie beyond an open end. For each kind of term that this
+ * concerns: the smallest and largest offset of the sites of the term along each axis.
  */
 const BOUNDS = [];
 
-/** Number of coefficients in a row. */
+/** Number of coefficients in a row; each flow or stage of a step has a row. */
 const COEFFICIENTS = 2;
 
 /** The durations of the flows, as fractions of a step: one for each row of coefficients. */
@@ -146,7 +149,7 @@ const PROBE_STEP = 1e-100;
 
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -154,7 +157,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -169,7 +172,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -177,7 +180,10 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -186,9 +192,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/**
- * Make `count` steps of a solver. Throws StepError if count is not a number of steps, and if a step fails.
- */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -202,13 +206,13 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 /** The options of the constructor. */
 const OPTIONS = "x0 sizes params".split(" ");
 
-/** Compute the coefficients of a step of size h, a row for each entry of TIMES. */
+/** Compute the coefficients of a step of size h: a row for each entry of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
 }
 
-/** Arrays for the coefficients of a step. */
+/** Return arrays for the coefficients of a step: a row for each entry of TIMES. */
 function emptyRows() {
   return TIMES.map(() => new Float64Array(COEFFICIENTS));
 }
@@ -233,7 +237,10 @@ export class Solver {
   static CASIMIR_KINDS = CASIMIR_KINDS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, to be read only: one field after the other, each with the last axis fastest. */
+  /**
+   * The state, to be read only. The values of each coordinate at all sites follow one another, coordinate by
+   * coordinate; the last axis varies fastest.
+   */
   x;
   /** Time since the start. */
   t = 0;
@@ -243,13 +250,13 @@ export class Solver {
   h = NaN;
   /** Sizes, parameters, and tables of neighbours. */
   sites;
-  /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
+  /** A row of coefficients for each flow or stage. They depend on parameters and step size. */
   rows = emptyRows();
   /** Copy of the state before the present step, which is restored if the step fails. */
   before;
   /** Predictors of the stages; they are cleared when the step size changes. */
   past = {};
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -257,10 +264,11 @@ export class Solver {
    * Start at x0. Throws StepError for arguments that are not admissible.
    *
    * @param {object} options
-   * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
-   * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
-   * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
-   *   for all
+   * @param {ArrayLike<number>} options.x0 the values of each coordinate at all sites, in the order of
+   *   COORDINATES
+   * @param {number[]} [options.sizes] number of sites along each axis; with one axis,
+   *   it follows from x0 by default
+   * @param {object} [options.params] parameters by name: numbers, or arrays of values at sites or bonds
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);
@@ -272,7 +280,7 @@ export class Solver {
     expectSteps(this.params);
   }
 
-  /** All parameters; those at sites and at bonds are arrays. */
+  /** All parameters by name; a parameter with values at sites or bonds is an array. */
   get params() {
     return this.sites.params;
   }
@@ -282,7 +290,7 @@ export class Solver {
     return this.sites.sizes;
   }
 
-  /** The values of a field at all sites, a part of x; to be read only. */
+  /** The values of a coordinate at all sites: a part of x, to be read only. */
   field(name) {
     const k = COORDINATES.indexOf(name);
     if (k < 0) throw new StepError("BAD_ARGUMENT", this.steps, `there is no field ${name}`);
@@ -303,7 +311,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -323,10 +332,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {object} changes parameters by name: numbers, or arrays for those that differ from place to place
+   * @param {object} changes parameters by name: numbers, or arrays of values at sites or bonds
    * @returns {this}
    */
   setParameters(changes) {
@@ -339,13 +348,13 @@ export class Solver {
       this.sites.setParameters(before);
       throw error;
     }
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -370,8 +379,8 @@ export class Solver {
   }
 
   /**
-   * The contributions of each site to the Casimirs, one Casimir after the other in the order of CASIMIRS.
-   * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
+   * The contribution of each site to each Casimir, in the order of CASIMIRS. CASIMIR_KINDS says whether the
+   * contribution of each site is a Casimir of its own ("sites"), or the Casimir is their sum or product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);
@@ -379,7 +388,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H, laid out as x; x and t are the present state and time by default. */
+  /** The right-hand side pi(x) grad H, in the order of x; x and t are the present ones by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;
@@ -407,10 +416,10 @@ function sumOf(values) {
 }
 
 /**
- * The sites of a lattice: their parameters, and tables of the neighbours that functions of the model read.
+ * The sites of a lattice: the parameters, and tables of the neighbours that functions of the system read.
  */
 class Sites {
-  /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
+  /** Initialise from the options of a solver. Throws StepError if a value is not admissible. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -423,15 +432,15 @@ class Sites {
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
     /** The neighbour of each site, for each offset of NEAR. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
-    /** For each kind of term of H: 1 at sites where it exists, else 0. */
+    /** For each entry of BOUNDS: 1 at the sites whose terms exist, else 0. */
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     /** The flows of a step, each as [part of H, row of coefficients]. */
     this.flows = SCHEDULE;
   }
 
   /**
-   * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, and
-   * positive where required.
+   * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown
+   * names, for values that are not finite, and for values that are not positive where this is required.
    */
   #admitted(overrides) {
     const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
@@ -450,7 +459,7 @@ class Sites {
     return Object.freeze(params);
   }
 
-  /** Change parameters; throws StepError for values that are not admissible, and then changes nothing. */
+  /** Change parameters. If a value is not admissible, throws StepError and changes nothing. */
   setParameters(changes) {
     const { params } = this;
     this.params = this.#admitted({ ...params, ...changes });
@@ -471,7 +480,7 @@ class Sites {
     return place;
   }
 
-  /** The neighbour of a site at an offset; beyond open ends any site, whose values are multiplied by 0. */
+  /** The neighbour of a site at an offset. Beyond open ends it is any site, since it has the factor 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -482,7 +491,7 @@ class Sites {
     }, 0);
   }
 
-  /** 1 if all neighbours of a site from offset low to high exist, along each axis, else 0. */
+  /** 1 if, along each axis, all neighbours of a site from offset low to offset high exist; else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
@@ -499,7 +508,7 @@ function allFinite(values) {
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
-/** Make one step; returns a status. If it fails, the state is undefined. */
+/** Make one step, and return its status. If the step fails, the state is undefined. */
 function makeStep(solver) {
   const { x, rows, sites } = solver;
   for (const [part, row] of sites.flows) {

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 826a6eb7a5cd55358d41cbe89176a6d866e46b4e71a8af7e1791741db5a4add4
+# body-sha256: 88c75378eb44ccf008b8998dc38cfc0f2197b7bfdbb248701029890395125f59
 import numpy as np
 
 VERSION = "0.1.0"
@@ -19,28 +19,31 @@ CASIMIRS = ("momentum", "length",)
 DEFAULT_PARAMETERS = {
 }
 
-# Parameters that may be arrays with a value at each site, and those that must be positive.
+# Parameters that may be arrays with a value at each site.
 AT_SITES = ()
+# Parameters that must be positive.
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
-# sites.
+# Whether the ends of the lattice are open, along each axis.
 OPEN = (False,)
+# Smallest number of sites along each axis.
 LEAST = (2,)
+# Numbers that must divide the number of sites along each axis.
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the duration of its flow as a fraction of the step. If H = T + V has modified
-# kicks, MULTIPLES has the factors of h² {V, {V, T}} in them. SCHEDULE has the flows of a step in order, each as (part of
-# H, row).
+# The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
+# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
 MULTIPLES = ()
+# The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))
 
 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those computed so far.
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    integrate() stored before this step.
     """
 
     def __init__(self, step, status, states):
@@ -52,18 +55,18 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step; its argument is the status."""
+    """A step failed; the argument of this error is the status."""
 
 
 def _finite(values):
-    """Return the values unchanged; raises FailedError if one is not finite."""
+    """Return the values unchanged. Raises FailedError if a value is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
 
 
 class _Sites:
-    """Sites of a lattice of given sizes, with all parameters."""
+    """The sites of a lattice, and the parameters of the system."""
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -87,7 +90,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of a parameter: that of the sites, or () for a single value."""
+        """Return the shape of a parameter: the sizes of the lattice, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -115,7 +118,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """Return the state after one step from x; raises FailedError. `past` is unused: splittings need no predictors."""
+    """Return the state after one step from x. Raises FailedError if the step fails. `past` is unused."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -123,7 +126,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
+    """Return the coefficients of a step of size h: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -145,9 +148,9 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
-    (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step: shape (frames, DIM, *sizes).
 
+    x0 has the shape (DIM, *sizes).
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
     x, sites = _started(x0, parameters)
@@ -177,13 +180,13 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, in an array (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
 
 def vector_field(x, **parameters):
-    """Return pi(x) grad H(x), of the shape of x."""
+    """Return pi(x) grad H(x), an array of the shape of x."""
     x, sites = _started(x, parameters)
     return _vector_field(sites.parameters, x, sites)
 

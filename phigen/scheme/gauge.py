@@ -284,7 +284,7 @@ def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
         products += [total(a * b for a, b in zip(h, c, strict=True)), total(b * b for b in c)]
     guide = Kernel(
         "guide",
-        "the leading error vector pi grad S_3, as a function of the gauge (factors of Casimirs)",
+        "the leading error pi grad S_3 of a step of order 2, as a function of the factors of Casimirs (gauge)",
         {"params": system.parameter_names, **gauge.inputs, "x": system.coordinates},
         (Output("error", hamiltonian_vector_field(system.poisson, slope)),),
     )

@@ -104,7 +104,7 @@ class GaussPolicy(Policy):
     """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
     compared."""
 
-    most_rising: int = count(3, "a step fails if the change grows in (number of stages + this) sweeps in a row")
+    most_rising: int = count(3, "a step fails if changes grow in (number of stages + this) successive sweeps")
     solved: float = number(
         2e-18, "sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift"
     )
@@ -127,7 +127,7 @@ class PredictorPolicy(Policy):
 
     reach: float = number(4.0, "largest relative distance of a prediction from the last solution")
     differences: int = count(
-        9, "number of stored differences; differences of higher order would amplify rounding errors"
+        9, "number of stored differences of solutions; higher differences would amplify rounding errors"
     )
 
 
@@ -146,10 +146,10 @@ class GaugeSearch(Policy):
     """The search for the multiples of Casimirs whose subtraction from H minimises the leading error of a step."""
 
     samples: int = count(32, "number of sample states along a short piece of the trajectory")
-    degree: int = count(6, "degree of the squared error in the factor of a Casimir, since S_3 is cubic in H")
-    sweeps: int = count(4, "largest number of rounds; a round optimises each factor once")
+    degree: int = count(6, "degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H")
+    sweeps: int = count(4, "largest number of rounds of the search; a round optimises each factor once")
     grids: int = count(
-        3, "number of grids in the search for a factor; each is finer by the factor MESH than the one before"
+        3, "number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before"
     )
     first_reach: int = count(24, "points of the first grid on each side of its centre")
     reach_of_grid: int = count(8, "points of later grids on each side of the best point so far")

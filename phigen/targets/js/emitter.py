@@ -122,7 +122,7 @@ def _table(program: Program) -> Mapping[str, object]:
     return {
         "middles": json.dumps(program.midpoints) if step.refresh else "",
         "prepared": step.prepared,
-        "renewing": "the step" if program.noise else "the time",
+        "renewing": "time or noise" if program.noise else "the time",
         "coefficients": step.row,
         "moments": json.dumps(schedule.moments) if schedule and step.refresh else "",
         "times": schedule is not None,

@@ -68,7 +68,7 @@ SOLVER = (
             "tCarry = 0;",
         ),
         ("tCarry",),
-        (Option("gauge", "ArrayLike<number>", "energy level e; steps with the same e have the same K"),),
+        (Option("gauge", "ArrayLike<number>", "energy level e, -H(x0) by default"),),
     ),
     StateFields(
         "TIMED",
@@ -80,7 +80,7 @@ SOLVER = (
     StateFields(
         "NOISE",
         (
-            "/** The random numbers of a step are a function of seed, member and step0 + steps. */",
+            "/** The random numbers of a step depend on seed, member and step0 + steps. */",
             "seed = 0;",
             "member = 0;",
             "step0 = 0;",
@@ -89,7 +89,7 @@ SOLVER = (
         ),
         options=(
             Option("seed", "number | bigint", "seed of the random numbers, 64 bits, 0 by default"),
-            Option("member", "number", "member of an ensemble, 32 bits, 0 by default"),
+            Option("member", "number", "number of the trajectory, 32 bits, 0 by default"),
             Option("step0", "number", "number of steps made before x0, 0 by default"),
         ),
         arguments=("@param {ArrayLike<number>} [dw] increments of the noise; random ones by default",),
@@ -113,31 +113,31 @@ SOLVER = (
     StateFields("MONITOR", ("/** The energy level e: -H(x0), or the value passed as gauge. */", "gauge;")),
     StateFields(
         "GAUGE && !MONITOR",
-        ("/** The Casimirs in GAUGE, times these factors, are subtracted from H. */", "gauge;"),
+        ("/** gauge[k] times Casimir k of GAUGE is subtracted from H. */", "gauge;"),
         options=(
             Option(
                 "gauge",
                 "ArrayLike<number>",
-                "the Casimirs, times these factors, are subtracted from H;\nby default the factors follow from x0. "
-                "All steps with the same factors have the same Hamiltonian",
+                "gauge[k] times Casimir k of GAUGE is subtracted from H;\nby default, gauge is chosen for x0. "
+                "With a fixed gauge, a step is a Poisson map",
             ),
         ),
     ),
     StateFields(
         "RENEWED && NOISE",
-        ("/** Coefficients of each stage: functions of parameters and step size first, then of noise or time. */",),
+        ("/** For each stage, an array of coefficients; the last ones depend on noise or time. */",),
     ),
     StateFields(
         "RENEWED && !NOISE",
-        ("/** Coefficients of each stage: functions of parameters and step size first, then of the time. */",),
+        ("/** For each stage, an array of coefficients; the last ones depend on the time. */",),
     ),
-    StateFields("!RENEWED", ("/** Coefficients of each stage: functions of parameters and step size. */",)),
+    StateFields("!RENEWED", ("/** For each stage, an array of coefficients. They depend on parameters and step size. */",)),
     StateFields(fields=("coef = emptyTables();",)),
     StateFields("HISTORY", ("/** Predictor of each stage. */", "history = FRACTIONS.map(() => new History());")),
     StateFields(
         "ATTITUDE",
         (
-            "/** The attitude that was set; the product of the rotations since then; its rounding error. */",
+            "/** The attitude that was set last; the product of the rotations since then, and its rounding error. */",
             "firstElement;",
             "turned;",
             "turnedCarry;",
@@ -171,9 +171,9 @@ SOLVER = (
 LATTICE = (
     StateFields(
         options=(
-            Option("x0", "ArrayLike<number>", "one field after the other, in the order of COORDINATES", required=True),
-            Option("sizes", "number[]", "sites along each axis; with one axis those of x0 by default"),
-            Option("params", "object", "parameters; those at sites and at bonds are arrays, or one number\nfor all"),
+            Option("x0", "ArrayLike<number>", "the values of each coordinate at all sites, in the order of\nCOORDINATES", required=True),
+            Option("sizes", "number[]", "number of sites along each axis; with one axis,\nit follows from x0 by default"),
+            Option("params", "object", "parameters by name: numbers, or arrays of values at sites or bonds"),
         ),
     ),
     StateFields("TIMED", options=(Option("t0", "number", "the time of x0, 0 by default"),)),
@@ -181,7 +181,7 @@ LATTICE = (
         "NOISE",
         options=(
             Option("seed", "number | bigint", "seed of the random numbers, 64 bits, 0 by default"),
-            Option("member", "number", "member of an ensemble, 32 bits, 0 by default"),
+            Option("member", "number", "number of the trajectory, 32 bits, 0 by default"),
             Option("step0", "number", "number of steps made before x0, below 2^48, 0 by default"),
         ),
     ),
@@ -191,7 +191,7 @@ LATTICE = (
             Option(
                 "bonds",
                 "ArrayLike<number>",
-                "the ends of all bonds, counted from 0: a, b of the first, …",
+                "the sites at the ends of all bonds, counted from 0: a, b of the\nfirst bond, a, b of the second, …",
                 required=True,
             ),
         ),

@@ -10,20 +10,20 @@ from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.policies import PYTHON, policies_of
 
-_NOISE_ARGUMENTS = """ The random
-    numbers depend on seed, member and number of the step. member is the number of the first member, or an array with
-    the numbers of all members; the first step has the number step0. If increments are given, with the shape (steps,
-    increments) or (steps, members, increments), they replace random increments of the noise."""
+_NOISE_ARGUMENTS = """
+    Random numbers depend on seed, on the number of the member, and on the number of the step. member is the number of
+    the first member, or an array with the numbers of all members; step0 is the number of the first step. `increments`
+    replaces the random increments of the noise. Its shape is (steps, increments) or (steps, members, increments)."""
 
 #: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in the
 #: time tau of a monitor.
-_OF_GAUGE = """gauge (one value for each Casimir in GAUGE) replaces the factors that the solver would choose: the step
-    is a Poisson map for each fixed gauge."""
-_OF_LEVEL = "gauge replaces the energy level e = -H(x0): the step is a Poisson map for each fixed e."
+_OF_GAUGE = """gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
+    step is a Poisson map."""
+_OF_LEVEL = "gauge replaces the energy level e = -H(x0). For a fixed e, a step is a Poisson map."
 _OF_TAU = """
 
-    Steps have size h in the time tau. With times=True, the result is a pair: the states, and their times t, of shape
-    (rows, ...)."""
+    h is the size of a step in the time tau. With times=True, the result is a pair: the states, and an array (rows, ...)
+    of their times t."""
 
 
 def values_of(program: Program) -> dict[str, object]:
@@ -53,13 +53,13 @@ def _of_fixed(program: Program) -> dict[str, object]:
 
 
 def _of_gauge(program: Program) -> str:
-    """Return the sentence on the gauge for docstrings.
+    """Return what docstrings say about the gauge.
 
-    The sentence says that a step is a Poisson map, unless the step is a Gauss step that preserves the structure only up
-    to the truncation error.
+    A second sentence says that a step is a Poisson map. It is left out for systems with forces, and for Gauss steps
+    that preserve the structure only up to the truncation error.
     """
     said = _OF_LEVEL if program.monitor else _OF_GAUGE
-    return said.partition(":")[0] + "." if program.truncated else said
+    return said.partition(".")[0] + "." if program.truncated or program.forced else said
 
 
 def _of_time(program: Program) -> dict[str, object]:

@@ -1,6 +1,6 @@
 // ---- Errors ----
 
-/** Descriptions of statuses. */
+/** The meaning of each status, for error messages. */
 const STATUS = {
   NO_CONVERGENCE: "no convergence: the step is too large",
   SINGULAR: "singular Newton matrix: the step is too large",
@@ -8,7 +8,7 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
+/** Error: a step failed, or an argument is not admissible. A failed step leaves the state unchanged. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
@@ -23,7 +23,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError if an option is unknown, unless its value is undefined or null. */
 export function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
@@ -31,7 +31,10 @@ export function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values. Throws StepError unless they are `length` finite numbers; its message calls them `what`. */
+/**
+ * Return a copy of values. Throws StepError unless the values are `length` finite numbers; the error message
+ * calls them `what`.
+ */
 export function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;

@@ -5,7 +5,7 @@ import { DIM, explicit } from "./model.mjs";
 
 const increment = new Float64Array(DIM);
 
-/** Make one stage of a step, x + increment(x); returns a status. */
+/** Make one stage of a step: add its increment to x. Returns a status. */
 export function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;

@@ -8,7 +8,7 @@ import { moveCentre, toCartesian, toRelative } from "./bodies.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
 
-/** Make one step; returns a status. If it fails, the state is undefined. */
+/** Make one step, and return its status. If the step fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites } = solver;
   toRelative(solver);

@@ -3,9 +3,9 @@ import { CLOSE_CALL, DEGREE, FIRST_REACH, GRIDS, MESH, SAMPLES } from "./gauge_s
 import { REACH_OF_GRID, SAMPLE_LENGTH, SWEEPS } from "./gauge_search.mjs";
 import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";
 
-// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
+// ---- The choice of the gauge: the factors of Casimirs in H - sum of gauge[c] C_c ----
 
-/** Direction of the vector field at a point, a unit vector; 0 at equilibria. */
+/** The vector field at a point, divided by the sum of its |components|; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -13,13 +13,14 @@ function direction(params, at) {
   return slope.map((value) => value / speed);
 }
 
+/** The sum of the magnitudes of values. */
 function total(values) {
   return values.reduce((sum, value) => sum + Math.abs(value), 0);
 }
 
 /**
- * Sample a short piece of the trajectory from x, by a Runge-Kutta method whose steps have equal length in
- * phase space: with steps of equal time, a slow state would leave its neighbourhood.
+ * Return states on a short piece of the trajectory from x, by a Runge-Kutta method. Its steps have equal
+ * lengths in phase space, so the piece has the same length for slow and fast motions.
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
@@ -34,8 +35,8 @@ function sampled(params, x) {
 }
 
 /**
- * The leading error of the method: the sum of |pi grad S_3|^2 over the samples. S_3 is the first error
- * term in the Hamiltonian that steps follow (the modified Hamiltonian).
+ * The sum of |pi grad S_3|^2 over the samples. h^3 pi grad S_3 is the leading error of a step of order 2. At
+ * higher orders, too, a small |pi grad S_3| usually means a small error.
  */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
@@ -48,8 +49,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error at gauge[c] + t width. The error is a polynomial in gauge[c], given by forward
- * differences.
+ * Value of the error if gauge[c] is increased by t width (see leastOnLine). The error is a polynomial in t of
+ * degree DEGREE, given by its forward differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
@@ -58,8 +59,8 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * The shift of gauge[c], in units of width, that minimises the error, by a search on successively finer
- * grids.
+ * Return the change of gauge[c], in units of width, that minimises the error. The minimum is searched on a
+ * grid, and then on finer grids around the best point.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
@@ -89,9 +90,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c] grad
- * C_c. All factors are 0 if the error that they give is not finite.
+ * Return the gauge: factors of the Casimirs C_c that minimise gaugeError on a short piece of the trajectory
+ * from x. The search starts from the factors with the least |grad H - gauge[c] grad C_c|, and then optimises
+ * one factor after the other. If the resulting error is not finite, all factors are 0.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

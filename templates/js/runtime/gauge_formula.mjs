@@ -1,10 +1,10 @@
 import { GAUGE, products } from "./model.mjs";
 
-// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
+// ---- The choice of the gauge: the factors of Casimirs in H - sum of gauge[c] C_c ----
 
 /**
- * The gauge: for each Casimir C the factor c that minimises |grad H - c grad C| at x. A factor that is not
- * finite becomes 0.
+ * Return the gauge: for each Casimir C the factor g that minimises |grad H - g grad C| at x. Factors that are
+ * not finite are replaced by 0.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

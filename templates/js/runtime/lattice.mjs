@@ -18,13 +18,13 @@ import { makeStep } from "./flows.mjs";
 /** The options of the constructor. */
 // #state lattice_names
 
-/** Compute the coefficients of a step of size h, a row for each entry of TIMES. */
+/** Compute the coefficients of a step of size h: a row for each entry of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
 }
 
-/** Arrays for the coefficients of a step. */
+/** Return arrays for the coefficients of a step: a row for each entry of TIMES. */
 function emptyRows() {
   return TIMES.map(() => new Float64Array(COEFFICIENTS));
 }
@@ -51,7 +51,10 @@ export class Solver {
   // #members lattice_field_constants
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, to be read only: one field after the other, each with the last axis fastest. */
+  /**
+   * The state, to be read only. The values of each coordinate at all sites follow one another, coordinate by
+   * coordinate; the last axis varies fastest.
+   */
   x;
   // #if TIMED
   /** The time of x. */
@@ -62,7 +65,7 @@ export class Solver {
   // #endif
   // #if NOISE
   /**
-   * The random numbers of a site are a function of seed, member, step0 + steps, and the site.
+   * The random numbers of a site depend on seed, member, step0 + steps, and the number of the site.
    */
   seed = 0;
   member = 0;
@@ -78,13 +81,13 @@ export class Solver {
   h = NaN;
   /** Sizes, parameters, and tables of neighbours. */
   sites;
-  /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
+  /** A row of coefficients for each flow or stage. They depend on parameters and step size. */
   rows = emptyRows();
   /** Copy of the state before the present step, which is restored if the step fails. */
   before;
   /** Predictors of the stages; they are cleared when the step size changes. */
   past = {};
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -108,7 +111,7 @@ export class Solver {
     beginLevel(this);
   }
 
-  /** All parameters; those at sites and at bonds are arrays. */
+  /** All parameters by name; a parameter with values at sites or bonds is an array. */
   get params() {
     return this.sites.params;
   }
@@ -118,7 +121,7 @@ export class Solver {
     return this.sites.sizes;
   }
 
-  /** The values of a field at all sites, a part of x; to be read only. */
+  /** The values of a coordinate at all sites: a part of x, to be read only. */
   field(name) {
     const k = COORDINATES.indexOf(name);
     if (k < 0) throw new StepError("BAD_ARGUMENT", this.steps, `there is no field ${name}`);
@@ -139,7 +142,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * @returns {this}
@@ -162,10 +166,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {object} changes parameters by name: numbers, or arrays for those that differ from place to place
+   * @param {object} changes parameters by name: numbers, or arrays of values at sites or bonds
    * @returns {this}
    */
   setParameters(changes) {
@@ -182,14 +186,14 @@ export class Solver {
     // #if MONITOR
     this.level = changed.level;
     // #endif
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     return this;
   }
 
   // #members lattice_tangent
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -214,8 +218,8 @@ export class Solver {
   }
 
   /**
-   * The contributions of each site to the Casimirs, one Casimir after the other in the order of CASIMIRS.
-   * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
+   * The contribution of each site to each Casimir, in the order of CASIMIRS. CASIMIR_KINDS says whether the
+   * contribution of each site is a Casimir of its own ("sites"), or the Casimir is their sum or product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);
@@ -225,7 +229,7 @@ export class Solver {
 
   // #members lattice_observed
   // #members lattice_observed_fields
-  /** The right-hand side pi(x) grad H, laid out as x; x and t are the present state and time by default. */
+  /** The right-hand side pi(x) grad H, in the order of x; x and t are the present ones by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;

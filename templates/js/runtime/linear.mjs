@@ -1,13 +1,13 @@
 import { DIM } from "./model.mjs";
 
-/** The smallest normal number: avoids division by zero. */
+/** The smallest normal number. It is added to divisors that may be 0. */
 export const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side, both overwritten, by elimination with partial pivoting.
+ * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
- * @param {Float64Array} side becomes the solution
+ * @param {Float64Array} side is overwritten with the solution
  * @returns {boolean} false if the matrix is singular
  */
 export function solve(matrix, side) {

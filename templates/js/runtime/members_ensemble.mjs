@@ -5,22 +5,24 @@ import { Solver } from "./solver.mjs";
 /** Members of Solver: runs of many states. */
 export class Ensemble {
   /**
-   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * Make count steps from each of many initial states. A trajectory ends before the first step that fails.
    * #if GAUGE
    * Each state has its own gauge unless options.gauge is given.
    * #endif
-   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
-   * length.
+   * h and parameters may be arrays with one number for each initial state. Throws StepError if an array has
+   * another length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states
    * @param {number | ArrayLike<number>} h step size
    * @param {number} count number of steps
    * #if NOISE
-   * @param {object} [options] as in the constructor, without x0; member is the number of the first state
+   * @param {object} [options] as in the constructor, without x0; member is the number of the first
+   *   trajectory
    * #else
    * @param {object} [options] as in the constructor, without x0
    * #endif
-   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
+   * @returns {{x: Float64Array[], status: string[]}} the last state of each trajectory, and its
+   *   status: "OK", or the status of the step that failed
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);

@@ -8,10 +8,10 @@ import { DIM } from "./model.mjs";
 /** Members of Solver: changes of the state between steps. */
 export class Kicks {
   /**
-   * Between steps: replace the state by x; time, parameters and gauge are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Replace the state by x between steps; the time and the parameters stay the same. If x is not admissible,
+   * throws StepError and changes nothing.
    *
-   * @param {ArrayLike<number>} x may lie on another symplectic leaf; Casimirs are then those of x
+   * @param {ArrayLike<number>} x may lie on another symplectic leaf; the Casimirs then change, too
    * @returns {this}
    */
   setState(x) {
@@ -21,7 +21,8 @@ export class Kicks {
   }
 
   /**
-   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
+   * Add a change, such as an impulse, to the state between steps. If the change or the new state is not
+   * admissible, throws StepError and changes nothing.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}

@@ -13,7 +13,7 @@ import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 
 /**
  * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|; NaN or infinite if a component of the correction is.
+ * |y_j|. It is NaN or infinite if a component of the correction is.
  */
 export function relativeSize(y, correction) {
   let norm = 0;
@@ -36,10 +36,10 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
- * a status. The effect of the last correction on the increment is added to first order, without another
- * evaluation. So iterations end when the next correction is expected to be below TOLERANCE; its size is about
- * the square of the last one.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method, and add the increment at y to x. Returns a
+ * status. Iterations start from the predicted y. The next correction is about the square of the last one;
+ * iterations end when it is expected to be below TOLERANCE. The last correction of y changes the increment.
+ * This change is added to first order, without another evaluation.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -78,7 +78,7 @@ function attempt(solver, stage) {
   return "NO_CONVERGENCE";
 }
 
-/** Make one stage of a step; returns a status. */
+/** Make one stage of a step, and return its status. */
 export function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }

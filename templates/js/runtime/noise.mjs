@@ -5,7 +5,7 @@ import { twoNormals, words } from "./philox.mjs";
 
 // ---- Noise ----
 
-/** Compute normal variates of mean 0 and variance 1 for a step. */
+/** Compute the random numbers of a step: independent normal variates of mean 0 and variance 1. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -15,9 +15,9 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the noise in the next step: to `increments`, or if this is undefined, to random ones.
+ * Set the increments of the noise in the next step to `increments`. If this is undefined, they are random.
  *
- * @returns {boolean} false if an increment is not finite or missing
+ * @returns {boolean} false unless `increments` has DRAWS numbers, and all are finite
  */
 function draw(solver, increments) {
   const { dw, seed, member, step0, steps, h } = solver;

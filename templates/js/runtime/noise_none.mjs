@@ -1,4 +1,4 @@
-/** Contribution of noise to the size of an increment of the state: 0, since there is no noise. */
+/** Size of the increment of the state by noise: 0, since there is no noise. */
 export function sizeOfNoise() {
   return 0;
 }

@@ -13,7 +13,7 @@ function upper(a, b) {
 
 /**
  * Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
- * (2011): four random words, as a function of a counter of four words and a key of two.
+ * (2011). Returns four random words, as a function of a counter of four words and a key of two words.
  */
 function philox(counter, key) {
   let [a, b, c, d] = counter;
@@ -39,7 +39,7 @@ export function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Two standard normal variates (Box and Muller) of magnitude at most BOUND, from a counter of four words. */
+/** Return two standard normal variates by the method of Box and Muller, truncated at magnitude BOUND. */
 export function twoNormals(counter, key) {
   const [a, b, c, d] = philox(counter, key);
   const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
@@ -48,8 +48,8 @@ export function twoNormals(counter, key) {
 }
 
 /**
- * The values of seed, member and step0, which select random numbers, from the options of a solver. Throws
- * StepError for values that are not admissible.
+ * Return seed, member and step0 from the options of a solver; random numbers depend on them. Throws StepError
+ * if a value is not admissible.
  */
 export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {

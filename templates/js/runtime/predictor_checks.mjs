@@ -8,8 +8,9 @@ import { DIM, FRACTIONS } from "./model.mjs";
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
- * solution. It affects the speed only.
+ * Predictor of a stage. It stores the last solution y, and backward differences of earlier solutions. The sum
+ * of some of these entries predicts the next solution. Iterations start from the prediction, so a predictor
+ * affects the speed only.
  */
 export class History {
   /** Number of stored entries: the last solution and its differences. */
@@ -25,7 +26,8 @@ export class History {
   }
 
   /**
-   * Add the change of the state from `from` to `to` to the last solution; differences are unchanged.
+   * The state was changed from `from` to `to`: add this change to the last solution. The differences stay the
+   * same.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -43,8 +45,8 @@ export class History {
    * Predict the next solution: the last one plus backward differences.
    *
    * @param {Float64Array} value is overwritten
-   * @returns {boolean} false if no solution is known, or if the prediction is so far from the last solution
-   *     that the iteration could find an unrelated one
+   * @returns {boolean} false if no solution is known, or if the prediction is too far from the last
+   *     solution: the iteration might then find an unrelated solution
    */
   predict(value) {
     let distance = 0;
@@ -60,8 +62,8 @@ export class History {
   }
 
   /**
-   * Update the predictor with a solution. The error of the prediction of order k is the k-th difference; the
-   * order with the smallest error is used next.
+   * Update the predictor with a solution. The new k-th difference is the error that a prediction of order k
+   * would have had. The next prediction has the order with the smallest error.
    *
    * @param {Float64Array} value
    */
@@ -92,8 +94,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
- * is too large may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. If a step is too large, its
+ * equation may have solutions far away, at another energy, that have nothing to do with the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -124,7 +126,7 @@ export function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
+ * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage

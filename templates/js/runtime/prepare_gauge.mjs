@@ -6,7 +6,7 @@ export function prepareStage({ params, gauge }, h, table) {
   prepare(params, gauge, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 export function prepareProbe(params, table) {
   prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
 }

@@ -6,7 +6,7 @@ export function prepareStage({ params }, h, table) {
   prepare(params, h, table);
 }
 
-/** Compute the coefficients of a very short step, which are finite if parameters are admissible. */
+/** Compute the coefficients of a very small step. For admissible parameters they are finite. */
 export function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }

@@ -24,10 +24,10 @@ export function sumOf(values) {
 }
 
 /**
- * The sites of a lattice: their parameters, and tables of the neighbours that functions of the model read.
+ * The sites of a lattice: the parameters, and tables of the neighbours that functions of the system read.
  */
 export class Sites {
-  /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
+  /** Initialise from the options of a solver. Throws StepError if a value is not admissible. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -44,7 +44,7 @@ export class Sites {
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
     /** The neighbour of each site, for each offset of NEAR. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
-    /** For each kind of term of H: 1 at sites where it exists, else 0. */
+    /** For each entry of BOUNDS: 1 at the sites whose terms exist, else 0. */
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     // #if COLOURS
     const colours = every(Array, (i) => {
@@ -102,8 +102,8 @@ export class Sites {
   }
 
   /**
-   * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, and
-   * positive where required.
+   * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown
+   * names, for values that are not finite, and for values that are not positive where this is required.
    */
   #admitted(overrides) {
     const unknown = Object.keys(overrides).filter((name) => !Object.hasOwn(DEFAULT_PARAMETERS, name));
@@ -136,7 +136,7 @@ export class Sites {
     return Object.freeze(params);
   }
 
-  /** Change parameters; throws StepError for values that are not admissible, and then changes nothing. */
+  /** Change parameters. If a value is not admissible, throws StepError and changes nothing. */
   setParameters(changes) {
     const { params } = this;
     this.params = this.#admitted({ ...params, ...changes });
@@ -159,7 +159,7 @@ export class Sites {
     return place;
   }
 
-  /** The neighbour of a site at an offset; beyond open ends any site, whose values are multiplied by 0. */
+  /** The neighbour of a site at an offset. Beyond open ends it is any site, since it has the factor 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -193,7 +193,7 @@ export class Sites {
   }
 
   // #endif
-  /** 1 if all neighbours of a site from offset low to high exist, along each axis, else 0. */
+  /** 1 if, along each axis, all neighbours of a site from offset low to offset high exist; else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];

@@ -28,8 +28,9 @@ const number = new Float64Array(1);
 // #state names
 
 /**
- * All parameters: the given ones, else defaults. Throws StepError unless all are known, finite, and positive
- * where required, and unless the coefficients of a very small step are finite.
+ * Return all parameters: the given ones, and the defaults of the others. Throws StepError for unknown names,
+ * for values that are not finite, and for values that are not positive where this is required. The
+ * coefficients of a very small step must also be finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -62,7 +63,7 @@ export class Solver {
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   // #state fields
-  /** Number of steps and time at the last change of h. The time now is #timeBefore + (steps since then) h. */
+  /** Number of steps and time at the last change of h. The time is #timeBefore + (steps - #stepsBefore) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -100,7 +101,8 @@ export class Solver {
   }
 
   /**
-   * Make one step of size h, of either sign. Throws StepError; then the state is unchanged.
+   * Make one step of size h, which may be negative. If the step fails, throws StepError and leaves the state
+   * unchanged.
    *
    * @param {number} h
    * #state arguments
@@ -111,7 +113,7 @@ export class Solver {
     return this.integrate(h, 1);
   }
 
-  /** Make one step without correctors. Throws StepError; then the state is unchanged. */
+  /** Make one step without correctors. If it fails, throws StepError and leaves the state unchanged. */
   #stepOfRun(h) {
     // #endif
     this.#setStep(h);
@@ -132,8 +134,8 @@ export class Solver {
   }
 
   /**
-   * Make count steps. If one fails, throws StepError; x is the state before it, steps counts the
-   * successful ones.
+   * Make count steps. If a step fails, throws StepError; x is then the state before this step, and steps the
+   * number of successful steps.
    *
    * @param {number} h
    * @param {number} count
@@ -159,8 +161,8 @@ export class Solver {
 
   // #if CORRECTED
   /**
-   * Apply the corrector at the end of several steps. If no step was made, or if the corrector fails, restore
-   * the state before the steps; throws StepError if the corrector fails.
+   * Apply the corrector at the end of several steps. If no step was made, restore the state before the steps.
+   * If the corrector fails, restore this state and throw StepError.
    */
   #endRun(before) {
     const status = this.steps > before.steps ? makeStage(this, 0, END) : "";
@@ -173,12 +175,12 @@ export class Solver {
 
   // #endif
   /**
-   * Return an independent solver with the same state.
+   * Return an independent solver with the same state, time and parameters.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined if there is no such field
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -187,8 +189,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
-   * admissible; then nothing changes.
+   * Change parameters between steps; the state and the time stay the same. If a value is not admissible,
+   * throws StepError and changes nothing.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -197,7 +199,7 @@ export class Solver {
     const params = admitted({ ...this.params, ...changes });
     takeLevel({ ...this, params, h: NaN }, this.x);
     this.params = params;
-    this.h = NaN; // so that the next step computes the coefficients
+    this.h = NaN; // then the next step computes the coefficients anew
     takeLevel(this, this.x);
     forgetSteps(this);
     restartAttitude(this);

@@ -77,7 +77,7 @@ function remember(differences, value) {
   return order;
 }
 
-/** Make one step; returns a status. If it fails, the state is undefined. */
+/** Make one step, and return its status. If the step fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites, past } = solver;
   // #if NOISE

@@ -11,7 +11,7 @@ export function vectorFieldAt(params, t, x, out) {
   vectorField(params, t, x, out);
 }
 
-/** Set the time of the initial state from the options of a solver, 0 by default. */
+/** Set the time of the initial state to the option t0, 0 by default. */
 export function takeTime(solver, options) {
   [solver.t] = finite([options.t0 ?? 0], 1, "t0");
 }
