@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: e5a78f710338756e4fe2ad2b5da4572daa2736881c2cfe65a2f53945816e9672
+ * body-sha256: 6868a7012338d87fb0e9540f42f265aa1baf19b10267f920359003506886dbb0
  */
 #include "duffing.h"
 #include <float.h>
@@ -254,7 +254,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define duffing_FLOOR 1e-6 /* delta_i is relative to |y_i| + this times the largest |y_j| */
+#define duffing_FLOOR 1e-6 /* corrections of y_i are relative to |y_i| + this times the largest |y_j| */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* after a correction below this, slow iterations end */
 /* iterations are slow if a correction exceeds this fraction of the one before */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9af81c21a1596d91e374e7963a70d6828df0157fe40e3f73aec00ebd8fc60bc5
+ * body-sha256: b8c7375e3a5c5e4ab8328349e793434a56c74573eb4b733d6b1958b7971525a8
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -176,7 +176,7 @@ function vectorField(params, t, x, out) {
 /** Parameters are checked by the coefficients of this step size. */
 const PROBE_STEP = 1e-100;
 
-/** Delta_i is relative to |y_i| + this times the largest |y_j|. */
+/** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */
 const FLOOR = 1e-6;
 
 /** After a correction below this, slow iterations end. */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: bfa9fdada9a8797626bb40e314f7d9de3c354e0238fec04bbc3dc6fedef603bd
+# body-sha256: 6b931d3edeabbc62e110ee08001d546fd116c0dcd523d3e83885aefcbbb67c56
 import numpy as np
 
 VERSION = "0.1.0"
@@ -242,7 +242,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # delta_i is relative to |y_i| + this times the largest |y_j|
+FLOOR = 1e-6  # corrections of y_i are relative to |y_i| + this times the largest |y_j|
 NEARLY_SOLVED = 1e-8  # after a correction below this, slow iterations end
 SHRINKING = 0.25  # iterations are slow if a correction exceeds this fraction of the one before
 
@@ -261,8 +261,8 @@ def _attempt(coef, x, carry, y):
 
     x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
     the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
-    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
-    member: "" if the equation was solved.
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a
+    status for each member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -345,8 +345,10 @@ def _renewed(stage, t, h):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
@@ -386,8 +388,8 @@ def integrate(x0, h, steps, stride=1, t0=0.0, gauge=None, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h, t0 and parameters
     may be arrays with one number for each member. t0 is the time of x0.
-    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 2828699941b5be14ae15255b15d1e83383f0ef924bc817e79be1e33885161d0b
+ * body-sha256: 0cfe4990283f7a03f1650ea956083f85edececa8feff45422e24062b28e8d920
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -134,7 +134,7 @@ static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry
     }
 }
 
-/* Compute the coefficients that depend only on parameters and the duration of a flow. */
+/* Compute the coefficients that depend only on parameters, the energy level and the duration of a flow. */
 static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, const double gauge[1],
     double h, double coef[4])
 {

@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ebfb51f26c43e6287bea98851a95fdc3cbd9ccdb6a6e84ca87ebcfe3efda6b43
+# body-sha256: f6e5f116679eb91321c59b81ae9c4dedc53e9b1e40c90a4f3e40078a41e04672
 import numpy as np
 
 VERSION = "0.1.0"
@@ -119,7 +119,8 @@ def _admissible(values):
 
 
 def _prepare_row(parameters, gauge, h):
-    """Compute the coefficients that depend only on parameters and the duration of a flow."""
+    """Compute the coefficients that depend only on parameters, the energy level and the duration of a
+    flow."""
     oblateness = parameters["oblateness"]
     return [gauge[0], h, 0.5 * oblateness, 7.5 * (h * oblateness)]
 
@@ -162,7 +163,7 @@ def _flow2(coef, state):
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
 # Number of coefficients in a row.
 ROW = 4
-# The flows of a step in order, each as (part of K, row of coefficients).
+# The flows of a step in order, each as (part of the Hamiltonian, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12), (1, 13), (0, 14), (1, 15), (0, 16), (1, 17), (0, 18), (1, 19), (0, 20), (1, 21), (0, 22), (1, 23), (0, 24), (1, 25), (0, 26), (1, 27), (0, 28), (1, 29), (0, 30), (1, 31), (0, 32), (1, 33), (0, 34))
 FLOWS = (_flow1, _flow2,)
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 81a40c1fe06a9b023611d27fc105d2e4278b94688f574799ec0fc697b307fba0
+ * body-sha256: 7975abf90b5eed90914dc8f09e53c4ab9be1f331c86676ddbad87784e1d28356
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -536,7 +536,7 @@ enum {
 #define kowalevski_gauss_STALLED 0.8
 /* at changes below this, sweeps end when a change exceeds STALLED times the one before */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* at changes below this, sweeps end at the second change that is not smaller than the one before */
+/* at changes below this, sweeps end when a change has failed to shrink for the second time */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* The last change; how many changes grew in a row; how many changes grew near rounding level. */

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 757e12f4471ac96c621d6bd7c6ed05ebe595229936bbc93a86e2353471f04edc
+# body-sha256: 28f831fb2f6558919ec2ec6dfa565e6abeb4ae57f2ae120612ecf8a114c1177a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -206,7 +206,7 @@ MOST_RISING = 3  # a step fails if changes grow in (number of stages + this) suc
 SOLVED = 2e-18  # sweeps end when a further one would change less than this; with 2e-17, energy and Casimirs drift
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
 ROUNDING = 4e-16  # at changes below this, sweeps end when a change exceeds STALLED times the one before
-NEARLY_ROUNDING = 2e-14  # at changes below this, sweeps end at the second change that is not smaller than the one before
+NEARLY_ROUNDING = 2e-14  # at changes below this, sweeps end when a change has failed to shrink for the second time
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation. NODES are the nodes c, WEIGHTS the weights b. MIXING is mu = A diag(1/b), where A is the
@@ -236,18 +236,14 @@ def _point(stage, x):
 
 def _slopes(stage, point, z):
     """Return the increments h b_j f(z_j) of all stages j: z_j are the unknowns of the stage, f(z_j) their derivatives.
-
-    z and the result are arrays (unknowns, members, stages).
-    """
+    z and the result are arrays (unknowns, members, stages)."""
     weights = np.broadcast_to(np.reshape(stage[2], (-1, 1)) * WEIGHTS, point.shape[:2])
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
 def _change_of(x, change, increments):
-    """Return for each member the largest change of the unknowns at any stage.
-
-    Changes of the first PLAIN unknowns are relative to |x|, or to the increments of these unknowns if x = 0.
-    """
+    """Return for each member the largest change of the unknowns at any stage. Changes of the first PLAIN unknowns are
+    relative to |x|, or to the increments of these unknowns if x = 0."""
     square = np.sum(x**2, axis=-1)[:, np.newaxis] + np.finfo(float).tiny
     square = np.where(square > np.finfo(float).tiny, square, square + np.sum(increments[:PLAIN] ** 2, axis=0))
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / square, np.sum(change[PLAIN:] ** 2, axis=0)
@@ -255,11 +251,8 @@ def _change_of(x, change, increments):
 
 
 def _solved(stage, x, z):
-    """Solve the equations of a step by fixed-point sweeps, which start from the unknowns z of all stages.
-
-    Returns the increments of all stages, an array (unknowns, members, stages), and a status for each member: "" if the
-    equations were solved.
-    """
+    """Solve the equations of a step by fixed-point sweeps from the unknowns z. Return the stage increments, an array
+    (unknowns, members, stages), and a status for each member: "" if the equations were solved."""
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     point = _point(stage, x)
     solved = _slopes(stage, point, z)
@@ -302,10 +295,7 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, increments, fractions):
-    """Return states at fractions of a step that ends at x, in an array (fractions, DIM).
-
-    `increments` are the stage increments of the step, transformed to unknowns relative to x (see _advance).
-    """
+    """Return states at fractions of a step that ends at x, from its `increments` in the unknowns of the next step."""
     offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
@@ -382,8 +372,10 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
@@ -423,8 +415,8 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1b632d8fef28adc0a3fc37adb7e9b44ebb4a526e6cfcedeb7e2639ccaa709f4a
+# body-sha256: 7841b11c594a31f8f818fec3e04c1aafeb1bc1b305dddcca755537f9120f63a5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -155,8 +155,10 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
@@ -196,8 +198,8 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

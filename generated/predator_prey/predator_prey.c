@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: d7a3cf7c230eee1aba7bea289aba538115f583c00ae656c2f3e81ff233224dad
+ * body-sha256: caea22e3c14fec147dba9bec557e3748be286ef7f623491da2c5db88dbc3c9e2
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -228,7 +228,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define predator_prey_FLOOR 0.0 /* delta_i is relative to |y_i| + this times the largest |y_j| */
+#define predator_prey_FLOOR 0.0 /* corrections of y_i are relative to |y_i| + this times the largest |y_j| */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* after a correction below this, slow iterations end */
 /* iterations are slow if a correction exceeds this fraction of the one before */

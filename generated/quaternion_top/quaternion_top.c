@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 25f0df76f1b86eaa3a9206955edf1bdc461dc548ffa3ec5e8b7fd63b80362edc
+ * body-sha256: 330a3d78e2ded72c6cfe5d649e3a03c7c8ee303323dbc1f8b8b34b39899b98ca
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -34,7 +34,7 @@ static int quaternion_top_allowed(const quaternion_top_params *params)
         && isfinite(params->I3) && params->I3 > 0.0 && isfinite(params->weight) && isfinite(params->spring);
 }
 
-/* Compute the coefficients that depend only on parameters and step size. */
+/* Compute the coefficients that depend only on parameters, gauge and step size. */
 static void quaternion_top_prepare(const quaternion_top_params *params, const double gauge[1], double h,
     double coef[47])
 {

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: eaaea5023cd75e4434b4e9c128cbe37608fa13f295d26475edbead5135342a92
+# body-sha256: 1da4777760c53eadda1a32b7f1b787f7402eb5b806167eb637be00ee2bdea46c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -123,7 +123,7 @@ def _admissible(values):
 
 
 def _prepare(parameters, gauge, h):
-    """Compute the coefficients that depend only on parameters and step size."""
+    """Compute the coefficients that depend only on parameters, gauge and step size."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -861,9 +861,9 @@ def _attempt(coef, x, carry, p):
     """Make one stage: solve p = grad S_h(mean of the path) for the covector p, and move to the end of the path.
 
     The path dm/dt = pi(m) p, 0 <= t <= 1, starts at m = x; S_h is the generating function. x, carry and p have the
-    shape (members, DIM); iterations start from p. A step that needs more than MOST_PIECES pieces of paths is too large for a
-    meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the equation
-    was solved.
+    shape (members, DIM); iterations start from p. A step that needs more than MOST_PIECES pieces of paths is too large
+    for a meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the
+    equation was solved.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -969,8 +969,10 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
@@ -1010,8 +1012,8 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

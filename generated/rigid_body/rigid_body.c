@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 0927b80c43fa415850afd27b9a447aacccb2318c2325f7c3dcce8627e7fe1c72
+ * body-sha256: 956e49bea17536d4ff2a3ae602813b33ba09406f8f8d42b7866f25e41003fd77
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -94,7 +94,7 @@ static double rigid_body_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* Compute the coefficients that depend only on parameters and step size. */
+/* Compute the coefficients that depend only on parameters, gauge and step size. */
 static void rigid_body_prepare(const rigid_body_params *params, const double gauge[1], double h,
     double coef[restrict 35])
 {
@@ -659,7 +659,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define rigid_body_FLOOR 1e-6 /* delta_i is relative to |y_i| + this times the largest |y_j| */
+#define rigid_body_FLOOR 1e-6 /* corrections of y_i are relative to |y_i| + this times the largest |y_j| */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* after a correction below this, slow iterations end */
 /* iterations are slow if a correction exceeds this fraction of the one before */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eca3521833e85760ee5a5d6b44a718917b5149e2b5bc479e284e4a07416cc581
+ * body-sha256: f62de67918920e806d945bf2f3422d63d4453cbd5c4fe27e246ff2c3d999d99c
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -116,7 +116,7 @@ function phi1(s) {
   return value1;
 }
 
-/** Compute the coefficients that depend only on parameters and step size. */
+/** Compute the coefficients that depend only on parameters, gauge and step size. */
 function prepare(params, gauge, h, coef) {
   const t1 = 1 / params.I1;
   const t2 = h * h;
@@ -455,7 +455,7 @@ function vectorField(params, x, out) {
 /** Parameters are checked by the coefficients of this step size. */
 const PROBE_STEP = 1e-100;
 
-/** Delta_i is relative to |y_i| + this times the largest |y_j|. */
+/** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */
 const FLOOR = 1e-6;
 
 /** After a correction below this, slow iterations end. */

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 66b0d75b731430e6be957b77bd83d167b525b7f532a9c9c14e4bd026b221c37c
+# body-sha256: 706207098b79dda453fa4bad7c7a046ba53fede961ff448b9f3f6412375bc198
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,7 +209,7 @@ def _phi1(s):
 
 
 def _prepare(parameters, gauge, h):
-    """Compute the coefficients that depend only on parameters and step size."""
+    """Compute the coefficients that depend only on parameters, gauge and step size."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -488,7 +488,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # delta_i is relative to |y_i| + this times the largest |y_j|
+FLOOR = 1e-6  # corrections of y_i are relative to |y_i| + this times the largest |y_j|
 NEARLY_SOLVED = 1e-8  # after a correction below this, slow iterations end
 SHRINKING = 0.25  # iterations are slow if a correction exceeds this fraction of the one before
 
@@ -507,8 +507,8 @@ def _attempt(coef, x, carry, y):
 
     x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
     the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
-    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
-    member: "" if the equation was solved.
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a
+    status for each member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -630,8 +630,8 @@ def _choose_gauge(parameters, x):
     """Return factors of Casimirs that minimise the sum of |pi grad S_3|^2 over a short piece of each trajectory.
 
     h^3 pi grad S_3 is the leading error of a step of order 2. At higher orders, too, a small |pi grad S_3| usually
-    means a small error. The result has the shape (members, factors). The search starts from the factors lambda with the least
-    |grad H - lambda grad C|, and then optimises one factor after the other. If the resulting error of a member is not
+    means a small error. The search starts from the factors lambda with the least |grad H - lambda grad C|, and then
+    optimises one factor after the other. The result has the shape (members, factors). If the error of a member is not
     finite, its factors are 0.
     """
     points = _samples(parameters, x)
@@ -722,8 +722,10 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
@@ -763,8 +765,8 @@ def integrate(x0, h, steps, stride=1, gauge=None, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map.
+    gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

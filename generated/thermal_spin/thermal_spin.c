@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: fa76f5bdeb278e4046cde3ba5fc7b09e4500168ce6346817b68fa790336a7958
+ * body-sha256: 687e250090bde107977029b9131731ac10b6fe52f19b354d9d4ac41b0c3a221d
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -286,7 +286,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define thermal_spin_FLOOR 1e-6 /* delta_i is relative to |y_i| + this times the largest |y_j| */
+#define thermal_spin_FLOOR 1e-6 /* corrections of y_i are relative to |y_i| + this times the largest |y_j| */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* after a correction below this, slow iterations end */
 /* iterations are slow if a correction exceeds this fraction of the one before */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: de6f73887280e11e4f48e128085f69dad1ecec0c47875402f3af47519a250b49
+ * body-sha256: 0229f4b26666d0b26a6394914eb3f248ef7ebf260b90f9cfbc787e6bc3ff510a
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -274,7 +274,7 @@ function vectorField(params, x, out) {
 /** Parameters are checked by the coefficients of this step size. */
 const PROBE_STEP = 1e-100;
 
-/** Delta_i is relative to |y_i| + this times the largest |y_j|. */
+/** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */
 const FLOOR = 1e-6;
 
 /** After a correction below this, slow iterations end. */

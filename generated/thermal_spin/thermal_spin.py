@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 43cd482fbd0777cc1997f49aa4b518ff24733871b1319e9b93a249467b4fb19f
+# body-sha256: a510a2b7e266af36b5ea1703ee5e611396a1c1607966e45961cbdcb7e26e7aba
 import numpy as np
 
 VERSION = "0.1.0"
@@ -332,7 +332,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # delta_i is relative to |y_i| + this times the largest |y_j|
+FLOOR = 1e-6  # corrections of y_i are relative to |y_i| + this times the largest |y_j|
 NEARLY_SOLVED = 1e-8  # after a correction below this, slow iterations end
 SHRINKING = 0.25  # iterations are slow if a correction exceeds this fraction of the one before
 
@@ -351,8 +351,8 @@ def _attempt(coef, x, carry, y):
 
     x, carry and y have the shape (members, DIM); iterations start from y. The next correction is about
     the square of the last one; iterations end when it is expected to be below 1e-20. The last correction of y
-    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a status for each
-    member: "" if the equation was solved.
+    changes the increment; this change is added to first order. Returns the new x, its compensation term, y, and a
+    status for each member: "" if the equation was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -483,8 +483,10 @@ def _renewed(stage, t, h, dw):
 
 
 def gauge(x, **parameters):
-    """Return the factors (..., len(GAUGE)) for trajectories from x, by which integrate() multiplies the Casimirs in GAUGE
-    before it subtracts them from H."""
+    """Return the gauge for trajectories from x: for each Casimir in GAUGE a factor, in an array (..., len(GAUGE)).
+
+    integrate() subtracts the Casimirs, multiplied by these factors, from H.
+    """
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))

@@ -183,12 +183,13 @@ def _path(
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
     """Return the kernel ``prepare``, which computes the coefficients.
 
-    Coefficients are values that depend only on parameters and the step size. The kernel must be built last, when the
+    Coefficients are values that depend only on parameters, gauge and step size. The kernel must be built last, when the
     table of coefficients is full.
     """
+    held = ", the energy level" if gauge.monitor else ", gauge" if gauge.inputs else ""
     return Kernel(
         "prepare",
-        "compute the coefficients that depend only on parameters and step size",
+        f"compute the coefficients that depend only on parameters{held} and step size",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )

@@ -57,7 +57,7 @@ class MeasurePolicy(Policy):
     ``floor`` is 0 if the coordinates keep their signs, since the sizes of these coordinates may differ much.
     """
 
-    floor: float = number(1e-6, "delta_i is relative to |y_i| + this times the largest |y_j|")
+    floor: float = number(1e-6, "corrections of y_i are relative to |y_i| + this times the largest |y_j|")
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class GaussPolicy(Policy):
         4e-16, "at changes below this, sweeps end when a change exceeds STALLED times the one before"
     )
     nearly_rounding: float = number(
-        2e-14, "at changes below this, sweeps end at the second change that is not smaller than the one before"
+        2e-14, "at changes below this, sweeps end when a change has failed to shrink for the second time"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -169,7 +169,7 @@ class TangentPolicy(Policy):
     differentiated."""
 
     tangent_solved: float = number(1e-15, "a correction below this consists of rounding errors")
-    tangent_nearly_solved: float = number(1e-10, "so does a correction below this that no longer shrinks")
+    tangent_nearly_solved: float = number(1e-10, "a correction below this that no longer shrinks is accepted, too")
     tangent_shrinking: float = number(0.25, "a correction has shrunk if it is below this fraction of the one before")
 
 
@@ -244,7 +244,7 @@ class LatticeTangentPolicy(Policy):
     carried: float = number(
         2.0**-54, "a residual below this fraction of the tangent vector consists of rounding errors"
     )
-    nearly_carried: float = number(1e-11, "so does a residual below this that no longer shrinks")
+    nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is accepted, too")
     carried_shrinking: float = number(0.5, "a residual has shrunk if it is below this fraction of the one before")
 
 

@@ -137,9 +137,10 @@ def _step(
     renewed_inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in renewed_inputs.items() if symbols})
     inputs = {"gauge": constant_symbols, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
+    held = ", the energy level" if constant_symbols else ""
     prepare = Kernel(
         "prepare",
-        "compute the coefficients that depend only on parameters and the duration of a flow",
+        f"compute the coefficients that depend only on parameters{held} and the duration of a flow",
         {"params": system.parameter_names, **{name: symbols for name, symbols in inputs.items() if symbols}},
         (Output("coef", tuple(coefficients.prepared)),),
         exponentials=coefficients.blocks,

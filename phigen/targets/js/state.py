@@ -131,7 +131,9 @@ SOLVER = (
         "RENEWED && !NOISE",
         ("/** For each stage, an array of coefficients; the last ones depend on the time. */",),
     ),
-    StateFields("!RENEWED", ("/** For each stage, an array of coefficients. They depend on parameters and step size. */",)),
+    StateFields(
+        "!RENEWED", ("/** For each stage, an array of coefficients. They depend on parameters and step size. */",)
+    ),
     StateFields(fields=("coef = emptyTables();",)),
     StateFields("HISTORY", ("/** Predictor of each stage. */", "history = FRACTIONS.map(() => new History());")),
     StateFields(
@@ -171,8 +173,15 @@ SOLVER = (
 LATTICE = (
     StateFields(
         options=(
-            Option("x0", "ArrayLike<number>", "the values of each coordinate at all sites, in the order of\nCOORDINATES", required=True),
-            Option("sizes", "number[]", "number of sites along each axis; with one axis,\nit follows from x0 by default"),
+            Option(
+                "x0",
+                "ArrayLike<number>",
+                "the values of each coordinate at all sites, in the order of\nCOORDINATES",
+                required=True,
+            ),
+            Option(
+                "sizes", "number[]", "number of sites along each axis; with one axis,\nit follows from x0 by default"
+            ),
             Option("params", "object", "parameters by name: numbers, or arrays of values at sites or bonds"),
         ),
     ),

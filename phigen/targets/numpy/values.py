@@ -17,8 +17,8 @@ _NOISE_ARGUMENTS = """
 
 #: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in the
 #: time tau of a monitor.
-_OF_GAUGE = """gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed gauge, a
-    step is a Poisson map."""
+_OF_GAUGE = """gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
+    gauge, a step is a Poisson map."""
 _OF_LEVEL = "gauge replaces the energy level e = -H(x0). For a fixed e, a step is a Poisson map."
 _OF_TAU = """
 
