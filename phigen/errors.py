@@ -11,7 +11,8 @@ exit code  meaning
 4          internal error: a bug of phigen
 5          a check failed: a statement is refuted, or output is stale or edited
            (`CheckError`)
-6          no usable C toolchain, or it failed (`ToolchainError`)
+6          a C compiler or a device is missing, or it failed
+           (`ToolchainError`, `DeviceError`)
 7          an integration failed (`StepError`)
 ========== =====================================================================
 """
@@ -118,7 +119,7 @@ class CheckError(PhigenError):
 
 
 class ToolchainError(PhigenError):
-    """There is no usable C compiler, or it refused the generated code."""
+    """There is no usable C compiler, or the compiler refused the generated code."""
 
     exit_code = 6
 

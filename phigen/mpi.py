@@ -9,8 +9,8 @@
 
 A plane is the set of all sites with one index of the first axis. Each process has adjacent planes, and runs the C
 solver on its planes and on copies of the neighbouring planes (a halo). If a sweep (an update of sites) reads the halo,
-the process first requests it from its neighbours, by mpi4py. It works on its inner planes until the halo has arrived.
-The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
+the process first requests the halo from the neighbouring processes, by mpi4py. Until the halo has arrived, the process
+updates its inner planes. The states are bitwise equal to the states of `LatticeSolver`, for any number of processes.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ class DistributedLattice:
         """Integrate as `LatticeSolver.integrate`; all processes call this method with the same arguments.
 
         ``x0`` is an array (coordinates, *sizes), or a function. A call x0(first, end) returns an array (coordinates,
-        end − first, …) with the planes from ``first`` to before ``end``, where a plane is the set of all sites with one
-        index of the first axis. If ``x0`` is a function, ``sizes`` is required. Parameters at sites may be functions as
+        end − first, …) with the planes first … end − 1, where a plane is the set of all sites with one index of the
+        first axis. If ``x0`` is a function, ``sizes`` is required. Parameters at sites may be functions as
         well. Frames are written to ``output``, a ``.npy`` file that all processes share.
 
         ``checkpoints`` is a path. The state is stored there with every frame. If a run is interrupted, the same call

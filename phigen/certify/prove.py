@@ -259,7 +259,7 @@ def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: An
 
 
 def _path_box(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any, u: list[Any]) -> list[list[float]]:
-    """Return a box that should contain all paths from states in X, for unknowns in u, by Picard's iteration."""
+    """Return a box, found by Picard's iteration, that should contain all paths from states in X with unknowns in u."""
     P = X
     for _ in range(PASSES):
         run = Evaluation(c, stage["path"]["operations"], {"m": P, "u": u, "t": [T]})

@@ -69,8 +69,8 @@ def invariant_statements(system: System) -> Iterator[Statement]:
 def force_statements(system: System) -> Iterator[Statement]:
     """Yield the statements about forces.
 
-    There is one for each Casimir: the rate at which the forces change it. With damping, a further statement says that
-    the damping changes H at the rate −λ |π∇H|².
+    One statement for each Casimir says at which rate the forces change the Casimir. With damping, a further statement
+    says that the damping changes H at the rate −λ |π∇H|².
     """
     if system.forces is None:
         return
@@ -93,7 +93,7 @@ def noise_statements(system: System) -> Iterator[Statement]:
     """Yield the statements about noise.
 
     The first one says whether the sources of noise commute, which decides the strong order. The second one says that
-    the density exp(−H/θ) is stationary for some temperature θ. It is left out if it is not proved.
+    the density exp(−H/T) is stationary for some temperature T. If it is not proved, there is no second statement.
     """
     if not system.noise:
         return

@@ -20,9 +20,10 @@ _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIV
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
     """Return the statement that ``e`` is positive.
 
-    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the form of
-    ``e`` shows that ``e`` is nowhere negative; the symbols ``positive`` count as positive. If the form does not exclude
-    that ``e`` is 0, the detail of the statement says so. In all other cases the statement is checked at the starts.
+    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It counts as proved if the form
+    of ``e`` shows that ``e`` is nowhere negative. If the form allows that ``e`` is 0, the detail of the statement says
+    so. Otherwise the statement is checked at the starts, or undecided if there are none. The symbols ``positive`` are
+    positive.
     """
     for point in starts:
         try:

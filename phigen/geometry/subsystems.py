@@ -15,7 +15,7 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
     """Return a system with H = 0 in the given ``coordinates``, with the π of ``form`` and the parameters of
     ``system``.
 
-    No Casimirs and invariants are searched for, so the system has none. Raises the errors of `structure`.
+    The system has no Casimirs and no invariants, since none are searched for. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(

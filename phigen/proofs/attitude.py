@@ -321,8 +321,8 @@ def element_statements(
     momentum.
 
     With ``cayley`` the increment is the Cayley transform of p instead. If x is the momentum in the body, the momentum
-    in space is conserved; if x is the momentum in space, the momentum in the body. ``start`` and ``end`` are the states
-    before and after a step; the attitude before the step is any quaternion.
+    in space is conserved. If x is the momentum in space, the momentum in the body is conserved. ``start`` and ``end``
+    are the states before and after a step; the attitude before the step is any quaternion.
     """
     covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     increment = direction(*covectors, cayley=cayley)

@@ -18,7 +18,7 @@ from phigen.spec.model import BirealisationChoice, PullbackForm
 
 KIND = "auto"
 
-#: Reason of the choice, as text for the user. The numbers 8 to 26 were measured for random quadratic H and for tops:
+#: Reason for the choice, as text for the user. The numbers 8 to 26 were measured for random quadratic H and for tops:
 #: the median of |π∇S_3| with the Cayley transform, divided by the median with the exponential. The quotient is 26 on
 #: so(3)*, 8 on se(3)* and 15 on so(4)*. For |π∇S_5| the quotients are 710, 49 and 330. On sl(2)* and gl(2)*, all
 #: quotients are between 0.9 and 2.

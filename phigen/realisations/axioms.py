@@ -1,6 +1,6 @@
 """The axioms of a bi-realisation. They are proved for the maps α and β of each system.
 
-Nothing is assumed because of the kind of a bi-realisation. With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i for
+The proofs assume nothing about the kind of a bi-realisation. With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i for
 functions of (x, p), the axioms are
 
     α(x, 0) = β(x, 0) = x,   {α_i, α_j} = π_ij∘α,   {β_i, β_j} = −π_ij∘β,   {α_i, β_j} = 0

@@ -43,7 +43,7 @@ Trilinear = dict[tuple[int, int, int, int], Expression]
 @dataclass(frozen=True)
 class _Escape:
     """Indices i, a, b of basis matrices of a Lie algebra for which E_a E_i E_b + E_b E_i E_a is not in the algebra.
-    Then no Cayley bi-realisation exists.
+    Then this representation of the Lie algebra gives no Cayley bi-realisation; another one may.
     """
 
     i: int

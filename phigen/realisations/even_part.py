@@ -9,9 +9,9 @@ Nφ(−N)x. It has these closed forms:
     N(N + s)² = 0            N (φ(s) x − φ'(s)(N + s) x)
 
 In the last case φ(−N) = φ(s) − φ'(s)(N + s) plus terms with the factor (N + s)², whose product with N is 0. The number
-s is a quadratic polynomial in p. For so(3), where Nx = p×(p×x), it is |p|²; for sl(2), minus the discriminant; for
-se(3), the squared rotation rate. This s follows from the structure constants: if −s is the only nonzero eigenvalue of
-N, and m is its multiplicity, then s = −tr N/m.
+s is a quadratic polynomial in p. For so(3), where Nx = p×(p×x), it is |p|²; for sl(2), 4 det P with the 2×2 matrix P of
+p; for se(3), the squared length of the rotation part of p. If −s is the only nonzero eigenvalue of N, and m its
+multiplicity, then s = −tr N/m. So s follows from the structure constants.
 """
 
 from __future__ import annotations

@@ -132,7 +132,8 @@ class _ModifiedRecursion:
     def _beginning(self, k: int) -> dict[str, Poly]:
         """Return the coefficient of h^k in τ − σh/2, as {symbol of τ: coefficient}.
 
-        τ − σh/2 is the time at the beginning of the step. The dictionary is empty if H does not depend on the time.
+        τ − σh/2 is the time at the beginning of a step of size σh. If H does not depend on the time, the dictionary is
+        empty.
         """
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}

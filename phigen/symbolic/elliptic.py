@@ -46,8 +46,8 @@ DOUBLINGS, TERMS = 4, 6
 #: ends when c/a is at most MEAN_RATIO. One more iteration would change c/a to (c/a)²/4, which is below rounding.
 MEAN_RATIO = 1e-8
 
-#: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments with which SIMD code
-#: calls R_D differ by at most 0.71. For such arguments five steps give double precision.
+#: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. In SIMD code, the arguments of R_D
+#: differ by at most 0.71, so that five steps give double precision.
 LANE_DUPLICATIONS = 5
 
 

@@ -45,8 +45,7 @@ def order_of(name: str) -> int:
 
 
 def coefficient(order: int, n: int) -> Fraction:
-    """Return the exact coefficient of sⁿ in the Taylor series of φ or, for the ``order`` 1 or 2, of its
-    derivative.
+    """Return the exact coefficient of sⁿ in the Taylor series of φ, φ′ or φ″; ``order`` is the number of primes.
 
     Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation.
     """
@@ -54,29 +53,20 @@ def coefficient(order: int, n: int) -> Fraction:
 
 
 def near_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of a derivative of φ (see `coefficient`), as many as |s| < `NEAR` needs.
-
-    The constant coefficient is the first one.
-    """
+    """Return the Taylor coefficients of φ, φ′ or φ″ that are needed for |s| < `NEAR`, the constant one first."""
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
 
 
 def lane_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of a derivative of φ (see `coefficient`), as many as |s| ≤ `LANE_REACH`
-    needs.
-
-    SIMD code uses them. The constant coefficient is the first one.
-    """
+    """Return the Taylor coefficients of φ, φ′ or φ″ that SIMD code needs, the constant one first."""
     return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of φ^(order)(s) − 2·order!/(4π² − s)^{order+1}, as many as |s| < `MIDDLE`
-    needs.
+    """Return the Taylor coefficients of φ, φ′ or φ″ without the pole nearest to 0, the constant coefficient first.
 
-    This function is the derivative of φ (see `coefficient`) without its pole nearest to 0. The constant coefficient is
-    the first one.
+    With k = ``order``, the function is φ^(k)(s) − 2·k!/(4π² − s)^{k+1}. The coefficients suffice for |s| < `MIDDLE`.
     """
     differences = []
     for n in range(MIDDLE_TERMS):
