@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e23db3bc0c81766d013eb82fb8a3d18ac3838909c80518662004184787213dcf
+# body-sha256: 3fc3eced4aef406ac81b66ada59b3df13d0cebe1f89370cbe5da32996f042235
 import numpy as np
 
 VERSION = "0.1.0"
@@ -216,8 +216,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """Return the state (DIM, *sizes) after one step of size h, of either sign;
-    raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign.
+    Raises StepError if the step fails."""
     return integrate(x, h, 1, **parameters)[-1]
 
 

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 30bb965f84313ea4814302db6abf0871f78907ac754f2a214719be9e6180288b
+# body-sha256: 792b940227cd4f02a35c545fde39cc6248a20a20094946e2871de16d206f52f7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -278,7 +278,7 @@ def _chain(a, d, k):
 def _power(a, b, r, k):
     """Return a[0] times coefficient k >= 1 of the Taylor series b = a**r, from a b' = r a' b.
 
-    The entries of a and b are coefficients of the series; those of b before k are used.
+    The entries of a and b are the coefficients of these series; b[k] is not used.
     """
     return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
@@ -416,8 +416,8 @@ def _piece(coef, p, start):
 def _path(coef, x, p):
     """Return the end minus x and the mean minus x of the path dm/dt = pi(m) p, 0 <= t <= 1, which starts at m = x.
 
-    Both are NaN if the path is too long or leaves the domain of pi. The path is cut into 1, 2, 4, ... pieces until the
-    Taylor series of each piece converges. Also returns the number of pieces that were computed.
+    These two results are NaN if the path is too long or leaves the domain of pi. The path is cut into 1, 2, 4, ...
+    pieces until the Taylor series of each piece converges. Also returns the number of pieces that were computed.
     """
     change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))

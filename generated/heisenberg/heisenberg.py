@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2cf64628bd4c322a974c898a3233924c7c1b29e195f5cf45e88a1f8d82fd19b6
+# body-sha256: fe77e65a276d5825936fac65ff43a4f5d0d9183c4b50e825b19f1b88e6976f4a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -144,8 +144,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """Return the state (DIM, *sizes) after one step of size h, of either sign;
-    raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign.
+    Raises StepError if the step fails."""
     return integrate(x, h, 1, **parameters)[-1]
 
 

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5a75d4172ab5f224ecb8705bc04230c3150282f8c4a5f82d07b73f5d7302cb81
+# body-sha256: 10880798c7e02fde5d16d4fae00ac0cf3c5f53e380a2f603c97f961729df5f58
 import numpy as np
 
 VERSION = "0.1.0"
@@ -185,7 +185,7 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """Return the state after one step from x; raises FailedError if it fails.
+    """Return the state after one step from x. Raises FailedError if the step fails.
 
     `past` has the predictor of each stage: the number of differences to be summed, and backward differences of the
     values of y - x in earlier steps, where y is the solution of the stage.
@@ -283,8 +283,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """Return the state (DIM, *sizes) after one step of size h, of either sign;
-    raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign.
+    Raises StepError if the step fails."""
     return integrate(x, h, 1, **parameters)[-1]
 
 

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1da4777760c53eadda1a32b7f1b787f7402eb5b806167eb637be00ee2bdea46c
+# body-sha256: 2385dbdc0a0ea21153ecf3a4458695e5f29ec89c1691daa6b67f4fe181e4ba21
 import numpy as np
 
 VERSION = "0.1.0"
@@ -574,7 +574,7 @@ def _chain(a, d, k):
 def _power(a, b, r, k):
     """Return a[0] times coefficient k >= 1 of the Taylor series b = a**r, from a b' = r a' b.
 
-    The entries of a and b are coefficients of the series; those of b before k are used.
+    The entries of a and b are the coefficients of these series; b[k] is not used.
     """
     return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
@@ -767,8 +767,8 @@ def _piece(coef, p, start):
 def _path(coef, x, p):
     """Return the end minus x and the mean minus x of the path dm/dt = pi(m) p, 0 <= t <= 1, which starts at m = x.
 
-    Both are NaN if the path is too long or leaves the domain of pi. The path is cut into 1, 2, 4, ... pieces until the
-    Taylor series of each piece converges. Also returns the number of pieces that were computed.
+    These two results are NaN if the path is too long or leaves the domain of pi. The path is cut into 1, 2, 4, ...
+    pieces until the Taylor series of each piece converges. Also returns the number of pieces that were computed.
     """
     change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))

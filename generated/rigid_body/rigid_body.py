@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 706207098b79dda453fa4bad7c7a046ba53fede961ff448b9f3f6412375bc198
+# body-sha256: 6c488a5eba360fd9b1518552d9446a09603fbaf5590d60fb546cf166ae139fe6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -570,7 +570,8 @@ def _line(error_of, gauge, c, width):
     """Return forward differences of the error as a function of factor c of the gauge, and the sum of its values.
 
     The error is computed at gauge[c] + (j - DEGREE / 2) width for j = 0 ... DEGREE. It is a polynomial of this degree
-    in the factor, so its differences, an array (DEGREE + 1, members), determine it.
+    in the factor, so its differences determine it. They form an array (DEGREE + 1, members). `width` is the unit in
+    which the factor is changed.
     """
     shifted, errors = gauge.copy(), []
     for j in range(DEGREE + 1):

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 88c75378eb44ccf008b8998dc38cfc0f2197b7bfdbb248701029890395125f59
+# body-sha256: a5e1ffde797bbe0d2828591da2b60ce1d7943ea9e5c42e77b4b814d1aa267342
 import numpy as np
 
 VERSION = "0.1.0"
@@ -142,8 +142,8 @@ def _started(x, parameters):
 
 
 def step(x, h, **parameters):
-    """Return the state (DIM, *sizes) after one step of size h, of either sign;
-    raises StepError."""
+    """Return the state (DIM, *sizes) after one step of size h, of either sign.
+    Raises StepError if the step fails."""
     return integrate(x, h, 1, **parameters)[-1]
 
 
