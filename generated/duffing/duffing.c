@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 6868a7012338d87fb0e9540f42f265aa1baf19b10267f920359003506886dbb0
+ * body-sha256: 86b8c77391ef05e6cf2ef62f6944d754134e3722c85dd6892f1a5eb832ed00a3
  */
 #include "duffing.h"
 #include <float.h>
@@ -133,7 +133,7 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
     out[1] = q + A * cos(omega * t) - q * (q * q);
 }
 
-#define duffing_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define duffing_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int duffing_finite(const double *values, int count)

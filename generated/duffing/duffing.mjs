@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b8c7375e3a5c5e4ab8328349e793434a56c74573eb4b733d6b1958b7971525a8
+ * body-sha256: fe01838f2bc9487928ac21c84ebdf2b4d41cada5265a131480efead21a7ed07a
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -173,7 +173,7 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
-/** Parameters are checked by the coefficients of this step size. */
+/** Step size for a check of parameters. */
 const PROBE_STEP = 1e-100;
 
 /** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6b931d3edeabbc62e110ee08001d546fd116c0dcd523d3e83885aefcbbb67c56
+# body-sha256: 9f04cbaa1fdc7d62c3d6f0cf20ed6280f73be1485b224a5b68ee4f4ef32827e9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -80,7 +80,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

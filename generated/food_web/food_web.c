@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: c3cdbecb05f6dbca1cf8f55233f5ec18968dcf5d90d5d42e01d40b7c31172e6e
+ * body-sha256: 5899a38207d1e4b67bb41c76158123828dcfa3767d6be06bd95fbd66284c0fdd
  */
 #include "food_web.h"
 #include <limits.h>
@@ -34,8 +34,7 @@ static const size_t food_web_least[food_web_AXES] = { 1 };
 /* For each part of H, 1 if its flow is made of one flow for each colour of sites, else 0. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
-/* Return the part of H, counted from 1, to which flow number *flow of a stage belongs. *flow becomes the
-   colour of the sites whose terms of H generate this flow. */
+/* Return the part of H, from 1, of flow *flow. *flow becomes the colour of the sites whose terms it has. */
 static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;
@@ -51,8 +50,7 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* A stage has one flow for each colour of sites. For each row of coefficients, the flows that use it: 0 the
-   first, 1 all inner ones, 2 the last, 3 all inner ones in reverse order. */
+/* For each row of coefficients, its flows of colours: 0 first, 1 inner, 2 last, 3 inner in reverse order. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
@@ -138,7 +136,7 @@ static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the bits of shifted; the last ones are k */
+    uint64_t bits; /* the bits of shifted; the lowest are the integer k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -264,8 +262,7 @@ static int food_web_connected(const food_web_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. used_by
-   is memory: for each colour, the last site with an earlier neighbour of this colour. */
+/* Give each site the first colour that no earlier neighbour by bonds has. used_by is working memory. */
 static void food_web_colour(food_web_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;
@@ -314,7 +311,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
-#define food_web_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define food_web_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 enum { food_web_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
@@ -444,8 +441,7 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 /* ---- The flows ---- */
 enum { food_web_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flows of a stage, which has one for each colour. kind: 0 the first, 1 all inner ones, 2 the last, 3
-   all inner ones in reverse order. */
+/* Apply flows of a stage, one for each colour. kind: 0 first, 1 inner, 2 last, 3 inner in reverse order. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
@@ -454,8 +450,7 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply flow `number` of step `steps`, from 0 on; food_web_FLOWS is the last flow merged with the first
-   one. */
+/* Apply flow `number` of step `steps`; food_web_FLOWS is the last flow merged with the first. */
 static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;

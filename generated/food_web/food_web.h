@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 66541bafb0f960abd433ad05ac639baa0454023bbc7964a2bcb4f35e809f37a0
+ * body-sha256: 96273521342827429c25ce5097ebb2e33a390d7500820d3485f17ef967634e85
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -65,8 +65,7 @@ typedef struct {
     const size_t *ends;
 } food_web_bonds;
 
-/* Number of bytes that food_web_init needs for these sizes and this number of bonds; 0 if they are not
-   admissible. */
+/* Bytes that food_web_init needs for these sizes and this number of bonds; 0 if they are refused. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,
@@ -87,7 +86,7 @@ void food_web_state(const food_web_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. food_web_saved writes *full_range and
    x[array][site], and returns the number of arrays: at most food_web_DIM, or 3 food_web_DIM with compensated
-   steps. To restore, call food_web_init, then food_web_resume with these values. */
+   steps. food_web_resume takes these values, after food_web_init. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *full_range);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields,
     size_t full_range);

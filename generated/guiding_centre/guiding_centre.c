@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: af55e036e84437e8add99f83e492c6816899662fb52b83269556327259f75dde
+ * body-sha256: ce238dda5b46fe0a2382b8e28f1688ce97031ec6ffae58dc06b7334587af40ff
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -116,7 +116,7 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
     out[3] = t19 * t17 - t12 * t18 - t1 * t21;
 }
 
-#define guiding_centre_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define guiding_centre_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int guiding_centre_finite(const double *values, int count)

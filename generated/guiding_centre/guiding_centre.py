@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 792b940227cd4f02a35c545fde39cc6248a20a20094946e2871de16d206f52f7
+# body-sha256: d95f020c8e1a407101f3f16288c38670c0d6515d96da4de53cb9f29bb5cfae6b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -83,7 +83,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 714c9bd8ab90759a7bdcc10ac964a2b088358e72986caec75f4487a677d4feff
+ * body-sha256: 5d3142d24747cd1111ff2b4856916dbde06c8c019084d93814a529972dd43ee3
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -88,7 +88,8 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
+/* Update the halo, copies of the sites at the opposite end, after the sites `from` to `to` - 1 have
+   changed. */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -524,7 +525,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 }
 
 /* ---- The lattice ---- */
-#define heisenberg_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define heisenberg_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 #ifdef _OPENMP
 #ifdef __cplusplus
@@ -713,8 +714,8 @@ typedef struct {
     const double *coef; /* its coefficients */
 } heisenberg_flow;
 
-/* Set *flow to flow `number` of the step that follows `steps` steps; heisenberg_FLOWS is the last flow merged
-   with the first. */
+/* Set *flow to flow `number` of the step that follows `steps` steps; number heisenberg_FLOWS is the last flow
+   merged with the first flow of the next step. */
 static void heisenberg_set_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
     flow->part = heisenberg_flow_parts[number];

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 58a9d2fe05f9a160029e3b9e904169f57e510165046640f77a1bb7f5c79701da
+ * body-sha256: f687058fb90d66106821d89758ae2d4739c2870055ff6748349b36b12bfd085d
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -82,7 +82,7 @@ heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenbe
 
 /* Save a run, and restore it so that it continues with the same bits. heisenberg_saved writes *full_range and
    x[array][site], and returns the number of arrays: at most heisenberg_DIM, or 3 heisenberg_DIM with
-   compensated steps. To restore, call heisenberg_init, then heisenberg_resume with these values. */
+   compensated steps. heisenberg_resume takes these values, after heisenberg_init. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *full_range);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t full_range);
@@ -96,10 +96,10 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 
 /* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same
    index of the first axis. A step consists of the stages 0 ... heisenberg_stages() - 1; each is a sweep over
-   all planes. Without noise, stage number heisenberg_stages() is the last stage of a step merged with the
-   first of the next step, as heisenberg_integrate does. A stage may be made in parts, in any order, with the
-   same bits as heisenberg_step. Before a part is made, all planes that it reads must have completed the
-   earlier stages. */
+   all planes. Without noise, there is one more stage, number heisenberg_stages(): the last stage of a step
+   merged with the first of the next step. heisenberg_integrate merges them too. A stage may be computed in
+   parts, in any order; the result has the same bits as heisenberg_step. Before a part is computed, all planes
+   that it reads must have completed the earlier stages. */
 typedef struct {
     /* number of planes that are read before the first updated one, and after the last */
     size_t behind, ahead;

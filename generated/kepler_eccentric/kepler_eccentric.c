@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 0cfe4990283f7a03f1650ea956083f85edececa8feff45422e24062b28e8d920
+ * body-sha256: cf1af183d7f5eb454368f61365d060ed3b28ae08d5ecab5710187231754a19c3
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -77,7 +77,7 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
     return 1.0 / (t3 + 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0 - 3.0 * (t1 / t2))));
 }
 
-#define kepler_eccentric_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define kepler_eccentric_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- The explicit step ---- */
 static int kepler_eccentric_finite(const double *values, int count)

@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f6e5f116679eb91321c59b81ae9c4dedc53e9b1e40c90a4f3e40078a41e04672
+# body-sha256: 86b0462a1705e47fab65127edf06d4a272691007c227f93167c4d96f74598030
 import numpy as np
 
 VERSION = "0.1.0"
@@ -81,7 +81,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 7975abf90b5eed90914dc8f09e53c4ab9be1f331c86676ddbad87784e1d28356
+ * body-sha256: 4619fe20ef972a54099948ce53da7c7370c0b9991c6165ce68d7be180ff6f48d
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -81,7 +81,7 @@ void kowalevski_gauss_vector_field(const kowalevski_gauss_params *params, const 
     out[5] = 0.5 * (G1 * P2) - 0.5 * (G2 * P1);
 }
 
-#define kowalevski_gauss_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define kowalevski_gauss_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums ---- */
 static int kowalevski_gauss_finite(const double *values, int count)

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 28f831fb2f6558919ec2ec6dfa565e6abeb4ae57f2ae120612ecf8a114c1177a
+# body-sha256: 863d6b6c2a8ce26b023786ff18fdd38e692f37cdc4a38c85548d2ec6020764f0
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,7 +78,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ff83f8c87e463add3f65102d189ec445e07fc395954fa423e9716d64fd3121bf
+ * body-sha256: 10eebe127f544f732d2d1ffdb7e53280cc729c6938403a958fb951b689a37e87
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -56,7 +56,7 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
     out[1] = -(g * sin(q));
 }
 
-#define pendulum_euler_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define pendulum_euler_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- The solver ---- */
 static int pendulum_euler_finite(const double *values, int count)

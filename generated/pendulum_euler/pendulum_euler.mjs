@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 485ee6e0ce9b9abf94afe7561f1d208cf8b4222ff8bf199fd5621fc3ed11433c
+ * body-sha256: 98c364bbfdccf7994815a7745f381775683d7ffdd6d58266fb1a60d29ba1e20e
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -77,7 +77,7 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
-/** Parameters are checked by the coefficients of this step size. */
+/** Step size for a check of parameters. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

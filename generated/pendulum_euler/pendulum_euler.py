@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 7841b11c594a31f8f818fec3e04c1aafeb1bc1b305dddcca755537f9120f63a5
+# body-sha256: 587d1bd7264a159f5e224f6a24509e70bca5baf95e5b4d3e73abe316958a3600
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,7 +78,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

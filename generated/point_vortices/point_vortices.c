@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: c30af41648f0dc1230fa81fda1e1dabc63067bdbe157eb00617c0e3ca305251e
+ * body-sha256: 090723a6841ed6f51c47baabea4fbba01199fdb7cea35861de89b7a2e5954332
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -273,7 +273,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 }
 
 /* ---- The lattice ---- */
-#define point_vortices_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define point_vortices_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* Stands before loops over row segments: threads share the iterations. */
 #ifdef _OPENMP

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: caea22e3c14fec147dba9bec557e3748be286ef7f623491da2c5db88dbc3c9e2
+ * body-sha256: 3000999c1aabecf727d48550ca3958e4d40523a22549d0001981c1564725573f
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -104,7 +104,7 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
     out[1] = -(t1 * (death / prey - gain));
 }
 
-#define predator_prey_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define predator_prey_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int predator_prey_finite(const double *values, int count)

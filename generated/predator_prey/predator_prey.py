@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d27f2c6def0547a5e836c7aed27ec10c455d1ec8b1184c2a8881c1e3ba54506b
+# body-sha256: 3354934b9e5cc2391fad21fbf6e14aa98d3f3967988e2083f4268163f0354bb7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -82,7 +82,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 330a3d78e2ded72c6cfe5d649e3a03c7c8ee303323dbc1f8b8b34b39899b98ca
+ * body-sha256: 83537f4932329dbe054b0356d048b29385be39271e17b78e282b2fffbf23f5ab
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -281,7 +281,7 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
     out[6] = 0.5 * (w * t3) + (0.5 * (x_ * t4) - 0.5 * (y * t7));
 }
 
-#define quaternion_top_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define quaternion_top_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int quaternion_top_finite(const double *values, int count)

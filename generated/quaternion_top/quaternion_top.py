@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2385dbdc0a0ea21153ecf3a4458695e5f29ec89c1691daa6b67f4fe181e4ba21
+# body-sha256: 848aa63ed7b4bc68818eefc28af5917e3c87877e178cfe0666be7a877cf92658
 import numpy as np
 
 VERSION = "0.1.0"
@@ -85,7 +85,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 956e49bea17536d4ff2a3ae602813b33ba09406f8f8d42b7866f25e41003fd77
+ * body-sha256: 4c3b97dcf458ac4ca58f2fb07f3acc007215b6327a769eb3258cd862ecbd398a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -343,7 +343,7 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
     out[2] = x1 * t2 - x2 * t3;
 }
 
-#define rigid_body_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define rigid_body_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_finite(const double *values, int count)

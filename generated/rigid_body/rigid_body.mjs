@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f62de67918920e806d945bf2f3422d63d4453cbd5c4fe27e246ff2c3d999d99c
+ * body-sha256: 63931574af30a97c5403d84adc69b15fe964ca1a3d7046684e256dbd15909cb7
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -452,7 +452,7 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
-/** Parameters are checked by the coefficients of this step size. */
+/** Step size for a check of parameters. */
 const PROBE_STEP = 1e-100;
 
 /** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */

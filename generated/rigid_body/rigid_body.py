@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6c488a5eba360fd9b1518552d9446a09603fbaf5590d60fb546cf166ae139fe6
+# body-sha256: 5fb20aa60b35787eb074af9097a72c3a9487fcd233ecc372763c3d6f7750ff4c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -82,7 +82,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

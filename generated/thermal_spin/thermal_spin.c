@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 687e250090bde107977029b9131731ac10b6fe52f19b354d9d4ac41b0c3a221d
+ * body-sha256: 0d0725aa8537a32b5282d88760a762b858f62a1f640bfd7d6bbcc792789c9868
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -199,7 +199,7 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
     out[8] = 0.0;
 }
 
-#define thermal_spin_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define thermal_spin_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_spin_finite(const double *values, int count)

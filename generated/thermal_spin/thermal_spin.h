@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c7f97d07052104994cedc95f41289a68df16970a56beaf7daee2818ab501eeef
+ * body-sha256: 4333040e2564a3e8e346537ad96eafec8e645849afeab2cc154b6d49a0eb7afd
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -19,8 +19,7 @@ extern "C" {
 enum { thermal_spin_COEFFICIENTS = 13 };
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
 enum { thermal_spin_DRAWS = 3 };   /* number of increments of all sources in a step */
-/* number of increments of one source in a step, one for each part of the step */
-enum { thermal_spin_PARTS = 1 };
+enum { thermal_spin_PARTS = 1 };   /* number of increments of one source in a step */
 
 typedef struct {
     double B;            /* field along z */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0229f4b26666d0b26a6394914eb3f248ef7ebf260b90f9cfbc787e6bc3ff510a
+ * body-sha256: e3db3661cc468b06736b3048900f6fdc75c0b1e316a6241cca4db6e35cbf2006
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -271,7 +271,7 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
-/** Parameters are checked by the coefficients of this step size. */
+/** Step size for a check of parameters. */
 const PROBE_STEP = 1e-100;
 
 /** Corrections of y_i are relative to |y_i| + this times the largest |y_j|. */

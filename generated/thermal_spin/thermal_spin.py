@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a510a2b7e266af36b5ea1703ee5e611396a1c1607966e45961cbdcb7e26e7aba
+# body-sha256: cf3c8f639c4ce2c491c584278bf5d67523cc91513acc52f5591eb64e80638b5c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -87,7 +87,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # parameters are checked by the coefficients of this step size
+PROBE_STEP = 1e-100  # step size for a check of parameters
 
 
 def _numbers(values):

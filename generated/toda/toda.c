@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 5b1a928a21738015f4262d7d246c79da50b3465fb702de2f38b3b8842947de06
+ * body-sha256: 7009869cf9a0648bcda8bdc1f92db96efb70ae117d101b135a1e943bf9784b33
  */
 #include "toda.h"
 #include <math.h>
@@ -74,7 +74,8 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
+/* Update the halo, copies of the sites at the opposite end, after the sites `from` to `to` - 1 have
+   changed. */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -128,7 +129,7 @@ static inline double toda_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + toda_ROUNDER, k = shifted - toda_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the bits of shifted; the last ones are k */
+    uint64_t bits; /* the bits of shifted; the lowest are the integer k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -236,7 +237,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-#define toda_PROBE_STEP 1e-100 /* parameters are checked by the coefficients of this step size */
+#define toda_PROBE_STEP 1e-100 /* step size for a check of parameters */
 
 enum { toda_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
@@ -339,7 +340,7 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* ---- The flows ---- */
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flow `number` of step `steps`, from 0 on; toda_FLOWS is the last flow merged with the first one. */
+/* Apply flow `number` of step `steps`; toda_FLOWS is the last flow merged with the first. */
 static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a1bc173ee1aba522a8dfdbc6d6fb52d79aa1e992b00a888cbf1b50df9cd71f8
+ * body-sha256: d0308167c2b29283ae203396b98b20977a24e788381ad208ef5c64c9a7a56b42
  */
 #ifndef TODA_H
 #define TODA_H
@@ -70,7 +70,7 @@ void toda_state(const toda_solver *s, double *x);
 
 /* Save a run, and restore it so that it continues with the same bits. toda_saved writes *full_range and
    x[array][site], and returns the number of arrays: at most toda_DIM, or 3 toda_DIM with compensated steps.
-   To restore, call toda_init, then toda_resume with these values. */
+   toda_resume takes these values, after toda_init. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *full_range);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

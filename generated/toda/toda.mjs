@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1d3f2c91f62d0e72ba5ade569c6d6a1d88f92fe60596ed3e9697ac6e14ed2a56
+ * body-sha256: 60f477f2703b7db0c0147a721f3aa84772225004196923a1818a3748a64dafe4
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -144,7 +144,7 @@ function vectorField(params, x, sites, out) {
   }
 }
 
-/** Parameters are checked by the coefficients of this step size. */
+/** Step size for a check of parameters. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

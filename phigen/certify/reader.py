@@ -431,7 +431,7 @@ def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:
-        raise RefusedError(f"flow {flow} of the C does more than add its changes")
+        raise RefusedError(f"function flow{flow} of the C does more than add increments to the state")
     return [[int(i), int(j)] for i, j in changes]
 
 

@@ -139,8 +139,8 @@ def _opening(
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
-    """Return the content with the changes of the modified Hamiltonian along the run or, if these were not measured,
-    with the reason.
+    """Add to the material of a report how much the modified Hamiltonian changes along the run. If this cannot be
+    measured, the reason is added instead.
     """
     from phigen.cli.verify import constancy_of
     from phigen.study.backward import NotOfferedError

@@ -25,8 +25,8 @@ class Source:
     amplitude: Expression
 
     def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-        """Return the covector σ∇g. The product of this covector and the noise increment ΔW is added to the covector p
-        of a step.
+        """Return the covector σ∇g for the Hamiltonian g and the amplitude σ of the source. A step adds σ∇g, times the
+        increment ΔW of the noise, to its covector p.
         """
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 

@@ -76,7 +76,9 @@ class _Reader:
         bonds, columns = self._bonds(self.lattice_run)
         sizes = self.lattice_run.sizes or (self._sites(bonds),)
         if len(bonds) and bonds.max() >= sizes[0]:
-            raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
+            raise self._error(
+                "bonds", f"a bond ends at site {bonds.max()}, but sites have the numbers 0 to {sizes[0] - 1}"
+            )
         if (names := self.lattice_run.names) and len(names) != sizes[0]:
             raise self._error("names", f"names: {len(names)} names for {sizes[0]} sites")
         self._expect_room(sizes)

@@ -92,7 +92,7 @@ def march(
 
 
 def standing(session: Session, number: float) -> Piece:
-    """Return a piece with one row: the present state of a session, ``number`` steps after the start."""
+    """Return a `Piece` with one row: the present state of a session, ``number`` steps after the start."""
     return _piece_of_rows([(session, number)], len(session.state()), len(session.element()))
 
 

@@ -85,7 +85,7 @@ def call_graph(files: Mapping[str, str], name: str, flags: Sequence[str]) -> Cal
         _output(command, folder)
         graphs = [*folder.glob("*.ci")]
         if not graphs:
-            raise ToolchainError(f"{command[0]} does not report the stack of functions\n  hint: use {_HINT}")
+            raise ToolchainError(f"{command[0]} cannot report how much stack each function uses\n  hint: use {_HINT}")
         text = graphs[0].read_text(encoding="utf-8")
     sizes = {_plain(title): (int(size), kind) for title, size, kind in _NODE.findall(text) if size}
     stack = {function: size for function, (size, _) in sizes.items()}

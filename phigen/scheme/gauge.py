@@ -69,8 +69,9 @@ class Gauge:
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
-        """The kernel argument ``gauge`` with the symbols that are constant on a trajectory; empty if there are no such
-        symbols."""
+        """The kernel argument ``gauge``, which holds the symbols that are constant on a trajectory. Without symbols the
+        mapping is empty.
+        """
         return {"gauge": self.symbols} if self.symbols else {}
 
     @property

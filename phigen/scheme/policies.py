@@ -46,7 +46,7 @@ class StartPolicy(Policy):
     a run has a step size.
     """
 
-    probe_step: float = number(1e-100, "parameters are checked by the coefficients of this step size")
+    probe_step: float = number(1e-100, "step size for a check of parameters")
 
 
 @dataclass(frozen=True)

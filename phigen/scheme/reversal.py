@@ -64,7 +64,7 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
 
     arguments = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
     candidates = [e for e in arguments if not previous.keys().isdisjoint(symbols_of(e)) and not _called_in(e)]
-    # values with at most one function; more functions would make the proof slow
+    # only expressions with at most one function, such as exp(x); with more functions the proof would be slow
     invariants = {
         e: symbol(Symbol("invariant", k))
         for k, (e, (reversed_value, _)) in enumerate(zip(candidates, fold(candidates, visit), strict=True))

@@ -46,12 +46,12 @@ class Coefficients:
 
     @property
     def slots(self) -> tuple[str, ...]:
-        """The symbols of the coefficients that ``prepare`` computes, as far as the table has been filled."""
+        """The symbols of the coefficients that ``prepare`` computes: those that have been requested so far."""
         return tuple(coefficient(k) for k in range(len(self.values)))
 
     @property
     def table(self) -> tuple[str, ...]:
-        """The symbols of all coefficients, as far as the table has been filled; those that are new in each step come
+        """The symbols of all coefficients that have been requested so far; those that are new in each step come
         last."""
         entries = (name for e in self.exponentials for name in e.symbols)
         return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))

@@ -83,7 +83,7 @@ def test_columns_of_bonds_are_found_by_their_names(tmp_path, bonds, ends, k, l):
         ("0,1\n2,2\n", "line 2: a bond has two different ends"),
         ("a,b\n0,1\n1\n", "cannot read 'bonds.csv'"),
         ("a,b\n0,x\n", "cannot read 'bonds.csv'"),
-        ("0,1\n1,4\n", "a bond ends at site 4, but there are 4 sites"),
+        ("0,1\n1,4\n", "a bond ends at site 4, but sites have the numbers 0 to 3"),
     ],
 )
 def test_bonds_that_mean_nothing_are_refused(tmp_path, bonds, why):

@@ -292,7 +292,7 @@ def _of_noise(noise: Noise) -> Sizes:
     return [
         ("SOURCES", len(noise.sources), f"sources of noise: {names}"),
         ("DRAWS", noise.draws, "number of increments of all sources in a step"),
-        ("PARTS", noise.parts, "number of increments of one source in a step, one for each part of the step"),
+        ("PARTS", noise.parts, "number of increments of one source in a step"),
     ]
 
 

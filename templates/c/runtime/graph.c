@@ -36,8 +36,7 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. used_by is memory: for
-   each colour, the last site with an earlier neighbour of this colour. */
+/* Give each site the first colour that no earlier neighbour by bonds has. used_by is working memory. */
 static void phi_colour(phi_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;

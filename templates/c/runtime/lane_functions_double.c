@@ -13,7 +13,7 @@ static inline double phi_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the bits of shifted; the last ones are k */
+    uint64_t bits; /* the bits of shifted; the lowest are the integer k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;

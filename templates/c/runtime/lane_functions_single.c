@@ -14,7 +14,7 @@ static inline float phi_exp_parts(float u, float *power)
 {
     const float shifted = u * 1.442695f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const float r = (u - k * 0.693359375f) + k * 2.1219444e-4f, rr = r * r;
-    uint32_t bits; /* the bits of shifted; the last ones are k */
+    uint32_t bits; /* the bits of shifted; the lowest are the integer k */
     float sum = 0.0013888889f, other = 1.9841270e-4f;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 127) << 23;

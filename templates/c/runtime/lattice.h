@@ -93,8 +93,8 @@ phi_status phi_kick(phi_solver *s, const double *change);
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
 /* Save a run, and restore it so that it continues with the same bits. phi_saved writes *full_range and
-   x[array][site], and returns the number of arrays: at most PHI_DIM, or 3 PHI_DIM with compensated steps. To restore,
-   call phi_init, then phi_resume with these values. */
+   x[array][site], and returns the number of arrays: at most PHI_DIM, or 3 PHI_DIM with compensated steps. phi_resume
+   takes these values, after phi_init. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *full_range);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t full_range);
 

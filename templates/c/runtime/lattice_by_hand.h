@@ -1,10 +1,10 @@
 #ifndef PHI_FILE_LATTICE_BY_HAND_H
 #define PHI_FILE_LATTICE_BY_HAND_H
 /* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same index of the
-   first axis. A step consists of the stages 0 ... phi_stages() - 1; each is a sweep over all planes. Without noise, stage
-   number phi_stages() is the last stage of a step merged with the first of the next step, as phi_integrate does. A stage may
-   be made in parts, in any order, with the same bits as phi_step. Before a part is made, all planes that it reads must have
-   completed the earlier stages. */
+   first axis. A step consists of the stages 0 ... phi_stages() - 1; each is a sweep over all planes. Without noise, there
+   is one more stage, number phi_stages(): the last stage of a step merged with the first of the next step. phi_integrate
+   merges them too. A stage may be computed in parts, in any order; the result has the same bits as phi_step. Before a
+   part is computed, all planes that it reads must have completed the earlier stages. */
 typedef struct {
     size_t behind, ahead;        /* number of planes that are read before the first updated one, and after the last */
     unsigned long read, changed; /* fields read on these planes, and fields that are updated: bit k is 1 for field k */

@@ -8,7 +8,8 @@ typedef struct {
 #include "state_of_flow.h"
 } phi_flow;
 
-/* Set *flow to flow `number` of the step that follows `steps` steps; PHI_FLOWS is the last flow merged with the first. */
+/* Set *flow to flow `number` of the step that follows `steps` steps; number PHI_FLOWS is the last flow
+   merged with the first flow of the next step. */
 static void phi_set_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
 {
     flow->part = phi_flow_parts[number];

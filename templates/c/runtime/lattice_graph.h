@@ -6,7 +6,7 @@ typedef struct {
     const size_t *ends;
 } phi_bonds;
 
-/* Number of bytes that phi_init needs for these sizes and this number of bonds; 0 if they are not admissible. */
+/* Bytes that phi_init needs for these sizes and this number of bonds; 0 if they are refused. */
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
 
 #if PHI_DEFAULTS

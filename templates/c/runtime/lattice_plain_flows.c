@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Apply flow `number` of step `steps`, from 0 on; PHI_FLOWS is the last flow merged with the first one. */
+/* Apply flow `number` of step `steps`; PHI_FLOWS is the last flow merged with the first. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_BODIES && !PHI_SHARED

@@ -36,9 +36,9 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 
 #endif
 #if PHI_OPEN_ROWS
-/* After a change of the sites from ... to - 1, update the halo: beyond an open end, it mirrors the sites of this end. */
+/* Update the halo, which mirrors the sites at open ends, after the sites `from` to `to` - 1 have changed. */
 #else
-/* After a change of the sites from ... to - 1, update the halo: copies of the sites at the opposite end. */
+/* Update the halo, copies of the sites at the opposite end, after the sites `from` to `to` - 1 have changed. */
 #endif
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {

@@ -224,7 +224,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         yield (
             "PARTS",
             program.noise.parts,
-            "number of increments of one source in a step, one for each part of the step",
+            "number of increments of one source in a step",
         )
     if step.equation:
         yield (
