@@ -28,11 +28,8 @@ BITS = 80  # precision of interval arithmetic in bits; doubles have 53
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
 ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the C computes
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
-POINTS = (
-    0.318309886,
-    0.577215665,
-    0.869604401,
-)  # each number determines a point of a box, at which derivatives are compared
+# Each number determines a point of a box, at which derivatives are compared.
+POINTS = (0.318309886, 0.577215665, 0.869604401)
 LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of other functions
 # the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
