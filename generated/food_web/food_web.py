@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3fc3eced4aef406ac81b66ada59b3df13d0cebe1f89370cbe5da32996f042235
+# body-sha256: b9614738e40361aca68e9800ca63f4699b3fa6a96b7ca4a34e3a8ad3477c43fc
 import numpy as np
 
 VERSION = "0.1.0"
@@ -35,8 +35,6 @@ PERIODS = (1,)
 
 # The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
-# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
-MULTIPLES = ()
 # The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
 

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d95f020c8e1a407101f3f16288c38670c0d6515d96da4de53cb9f29bb5cfae6b
+# body-sha256: eb6c8346bfc254e2e236a7bcaced905dcb3db7ab7c2dc7e3df9cbb37139368ed
 import numpy as np
 
 VERSION = "0.1.0"
@@ -180,7 +180,6 @@ def _generate(coef, y):
     )
 
 
-LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
 MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
 PATIENCE = 3  # number of iterations before the approximate Jacobian may be replaced by differences
 NEGLIGIBLE = 1e-17  # a Taylor series ends if its terms are below this fraction of the size of the path
@@ -265,14 +264,6 @@ def _holds(coef, p, m, slope):
 def _product(a, b, k):
     """Return coefficient k of the product of two Taylor series, whose coefficients are the entries of a and b."""
     return sum(a[j] * b[k - j] for j in range(k + 1))
-
-
-def _chain(a, d, k):
-    """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'.
-
-    The entries of a and d are coefficients of the series of a and f'(a).
-    """
-    return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
 
 
 def _power(a, b, r, k):

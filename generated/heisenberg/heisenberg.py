@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fe77e65a276d5825936fac65ff43a4f5d0d9183c4b50e825b19f1b88e6976f4a
+# body-sha256: c0e2774d9db30e8a45319bf8961ae3bdf09ef039c609a3f65d39ad580223e294
 import numpy as np
 
 VERSION = "0.1.0"
@@ -35,8 +35,6 @@ PERIODS = (1, 1, 1,)
 
 # The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.5, 0.5, 1.0, 0.5, 0.5,)
-# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
-MULTIPLES = ()
 # The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 863d6b6c2a8ce26b023786ff18fdd38e692f37cdc4a38c85548d2ec6020764f0
+# body-sha256: c2a823febedfc6747a59045b582ab725a20c27ac0052d097c606f5171e90a910
 import numpy as np
 
 VERSION = "0.1.0"
@@ -207,7 +207,6 @@ SOLVED = 2e-18  # sweeps end when a further one would change less than this; wit
 STALLED = 0.8  # above this ratio of successive changes, further sweeps do not help; with 0.4, Casimirs drifted
 ROUNDING = 4e-16  # at changes below this, sweeps end when a change exceeds STALLED times the one before
 NEARLY_ROUNDING = 2e-14  # at changes below this, sweeps end when a change has failed to shrink for the second time
-TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation. NODES are the nodes c, WEIGHTS the weights b. MIXING is mu = A diag(1/b), where A is the
 # Runge-Kutta matrix. All entries of mu + mu.T are exactly 1 in floating point, which makes the method symplectic.

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 10880798c7e02fde5d16d4fae00ac0cf3c5f53e380a2f603c97f961729df5f58
+# body-sha256: a93581cd21d65a9ca66ddbd1955049c65a5fccf5b8058ce412bf6e1113b17bef
 import numpy as np
 
 VERSION = "0.1.0"
@@ -37,8 +37,6 @@ PERIODS = (1,)
 
 # The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
-# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
-MULTIPLES = ()
 # The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 

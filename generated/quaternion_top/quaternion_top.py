@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 848aa63ed7b4bc68818eefc28af5917e3c87877e178cfe0666be7a877cf92658
+# body-sha256: 89115c0fc7147e7d3833a3194341485517e968a98429f6a2235b3d63a5ef40a4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -447,7 +447,6 @@ def _generate(coef, y):
     )
 
 
-LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
 MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
 PATIENCE = 3  # number of iterations before the approximate Jacobian may be replaced by differences
 NEGLIGIBLE = 1e-17  # a Taylor series ends if its terms are below this fraction of the size of the path
@@ -556,27 +555,6 @@ def _holds(coef, p, m, slope):
     error = np.abs(field.T - slope)
     scale = np.abs(m).sum(axis=-1, keepdims=True) + np.abs(slope).sum(axis=-1, keepdims=True)
     return (error <= ROUNDED_SLOPE * scale).all(axis=-1)
-
-
-def _product(a, b, k):
-    """Return coefficient k of the product of two Taylor series, whose coefficients are the entries of a and b."""
-    return sum(a[j] * b[k - j] for j in range(k + 1))
-
-
-def _chain(a, d, k):
-    """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'.
-
-    The entries of a and d are coefficients of the series of a and f'(a).
-    """
-    return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
-
-
-def _power(a, b, r, k):
-    """Return a[0] times coefficient k >= 1 of the Taylor series b = a**r, from a b' = r a' b.
-
-    The entries of a and b are the coefficients of these series; b[k] is not used.
-    """
-    return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
 
 def _piece(coef, p, start):

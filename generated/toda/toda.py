@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a5e1ffde797bbe0d2828591da2b60ce1d7943ea9e5c42e77b4b814d1aa267342
+# body-sha256: d557aae4bee5b9af4fb0ffabe3356150e6dcc1c6e5920e7e9ab4c0f80a10238e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,8 +33,6 @@ PERIODS = (1,)
 
 # The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
-# If H = T + V, some flows may be those of V + m h² {V, {V, T}}: the factor m for each row. Empty without such flows.
-MULTIPLES = ()
 # The flows or stages of a step in order, each as (part of H, row of coefficients).
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))
 

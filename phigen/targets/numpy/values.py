@@ -6,6 +6,7 @@ from phigen.ir.path_functions import TERMS
 from phigen.scheme.policies import PathPolicy
 from phigen.scheme.program import Program
 from phigen.scheme.steps import InnerSolve
+from phigen.targets.features import switches
 from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.policies import PYTHON, policies_of
@@ -26,10 +27,14 @@ _OF_TAU = """
     of their times t."""
 
 
+#: Constants of policies that NumPy modules do not read.
+_NOT_IN_NUMPY = ("TRIALS", "LONGEST_PATH")
+
+
 def values_of(program: Program) -> dict[str, object]:
     """Return the values that templates of NumPy modules share."""
     said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted, "None")}
-    policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
+    policies = {name: PYTHON.text(policy, _NOT_IN_NUMPY) for name, policy in policies_of(program).items()}
     return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 
 
@@ -80,9 +85,10 @@ def _of_step(program: Program) -> dict[str, object]:
     """Return the template values that concern the kind of step, its coefficients and stages, and its iteration."""
     step = program.step
     inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
-    longest = PathPolicy().longest_path
+    longest, features = PathPolicy().longest_path, switches(program)
     return {
         "path": step.path is not None,
+        "taylor": {kind: features[f"TAYLOR_{kind.upper()}"] for kind in ("product", "chain", "power")},
         "splitting": step.kind.flows,
         "collocation": step.kind.collocates,
         "renewed": step.renewed,
