@@ -88,7 +88,7 @@ def _of_step(program: Program) -> dict[str, object]:
     longest, features = PathPolicy().longest_path, switches(program)
     return {
         "path": step.path is not None,
-        "taylor": {kind: features[f"TAYLOR_{kind.upper()}"] for kind in ("product", "chain", "power")},
+        **{f"taylor_{kind}": features[f"TAYLOR_{kind.upper()}"] for kind in ("product", "chain", "power")},
         "splitting": step.kind.flows,
         "collocation": step.kind.collocates,
         "renewed": step.renewed,
