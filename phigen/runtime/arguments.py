@@ -101,8 +101,8 @@ def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
 def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
     """Return the initial time ``t0`` of a trajectory; the default is 0.
 
-    If the Hamiltonian does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. It is
-    then added to ``by_keyword``, and 0 is returned.
+    If the Hamiltonian does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. This
+    value is then added to ``by_keyword``, and 0 is returned.
     """
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
@@ -280,7 +280,8 @@ def ensemble(
     else:
         start = members(X0, "X0", interface)
     shape = (len(start),)
-    # Arrays over members are checked below. Here only their names are checked, so each array is replaced by a number.
+    # Here only names of parameters are checked, so a number replaces each array over members. The arrays are checked
+    # below.
     shared_values: list[dict[str, Any]] = [
         {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, by_keyword)
     ]
@@ -322,7 +323,7 @@ def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
-    """Return an array with a row for each member: the numbers of its initial attitude, then its initial position.
+    """Return an array with a row for each member: the components of its initial attitude and of its initial position.
 
     ``attitude0`` and ``position0`` are single values for all members, or have a first axis of members. The defaults are
     the identity and the origin.

@@ -23,7 +23,8 @@ class Backend(Protocol):
 
     @property
     def identity(self) -> str:
-        """A hash of everything that determines the results and the format of saved sessions."""
+        """A hash of the code of the solver: solvers with equal hashes compute equal results, and load each other's
+        sessions."""
         ...
 
     def start(
@@ -87,7 +88,7 @@ class Backend(Protocol):
         ...
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """Return π∇H at the states (rows, DIM), the same shape."""
+        """Return π∇H (rows, DIM) at the states (rows, DIM)."""
         ...
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:

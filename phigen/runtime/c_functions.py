@@ -21,8 +21,8 @@ _SIGNATURES = {
 }
 
 
-# Signatures for a Hamiltonian that depends on the time: the time is an additional argument. Each signature replaces the
-# one above that has the same name.
+# Signatures for a Hamiltonian that depends on the time: the time is an additional argument. Each replaces the signature
+# of the same name in `_SIGNATURES`.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
@@ -71,7 +71,7 @@ def functions_of(library: Any, interface: Interface) -> Any:
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # an additional argument has the times or gauges
+    if interface.time or "init_gauge" in offered:  # an additional argument: the times or gauges of the members
         _, signature_each = _EXTRAS["ensemble_each"]
         offered |= (
             {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}
@@ -108,7 +108,7 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signatures with the time as an additional argument; {} if H does not depend on the time."""
+    """Return those signatures in which the time is an additional argument; {} if H does not depend on the time."""
     time_positions = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
     dated = {name: (offered[name], position) for name, position in time_positions.items() if name in offered}
     return {name: (result, (*a[:position], _DOUBLE, *a[position:])) for name, ((result, a), position) in dated.items()}

@@ -44,9 +44,8 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Signatures of additional functions. ``_IN_TIME`` is for lattices, except graphs, whose H depends on the time.
-#: ``_GRAPH_IN_TIME`` is for graphs whose H depends on the time. ``_NOISY`` is for lattices with noise. Each of the
-#: three contains ``_PASSED``.
+#: Signatures of additional functions. ``_IN_TIME`` is for grids and pairs if H depends on the time, ``_GRAPH_IN_TIME``
+#: for graphs if H depends on the time, and ``_NOISY`` for lattices with noise. Each of the three contains ``_PASSED``.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}

@@ -2,10 +2,10 @@
 
 Besides the documented functions, this module calls ``size_t NAME_solver_size(void)`` and ``size_t
 NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``. With a monitor it
-also calls ``double NAME_solver_time(const NAME_solver *)``.
+also calls ``double NAME_solver_time(const NAME_solver *)``, the physical time since ``NAME_init``.
 
-The solver's struct is copied and stored as bytes. Of its members, this module reads only the first, ``x[DIM]`` of
-double or float.
+The solver's struct is copied and stored as bytes. Its first field is the state ``x[DIM]``, of double or float. This
+module reads no other field.
 """
 
 from __future__ import annotations
@@ -293,9 +293,9 @@ class CSolver:
     def _can_batch_pullback(self, members: Members) -> bool:
         """Whether one call of C for each segment of a run can compute the derivatives of all members.
 
-        For several segments this is not possible if H depends on the time, or if Casimirs are subtracted from H. The
-        initial time, or the multiples of the Casimirs, hold for the whole run, but the C would set them again at each
-        segment.
+        If a run has several segments, H must not depend on the time, and no Casimirs may be subtracted from H. The
+        reason is that each call sets the initial time and the multiples of Casimirs again, but they must not change
+        during a run.
         """
         if not hasattr(self._c, "pullback_each"):
             return False
@@ -427,7 +427,8 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return a list that contains the list of the times ``t``; the empty list if ``t`` is None."""
+    """Return [list of the times ``t``], or [] if ``t`` is None: the sequences that a call of C gets besides the
+    states."""
     return [] if t is None else [t.tolist()]
 
 

@@ -360,7 +360,8 @@ class CrossingFinder(Generic[C]):
         return None
 
     def _clock(self, session: C, counted_time: float) -> float:
-        """Return the physical time of a session if a monitor rescales the time by dt = g dτ; else ``counted_time``."""
+        """Return the physical time of a session. Without a monitor, this is ``counted_time``, the time computed from
+        the number of steps."""
         elapsed = getattr(session, "time", lambda: math.nan)()
         return counted_time if math.isnan(elapsed) else float(elapsed)
 

@@ -59,7 +59,7 @@ def after_steps(session: Followed, h: float, steps: int) -> End:
     The session, which is at the start of the run, is advanced to measure the time ``span`` of the run. If a step fails,
     ``span`` is the time before this step.
     """
-    with suppress(BackendError):  # the run itself will meet the same error and report it
+    with suppress(BackendError):  # the run itself fails at this step too, and reports the error
         session.advance(h, steps)
     return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
@@ -78,7 +78,7 @@ def where_zero(session: Followed, h: float, limit: int, g: Function, t0: float, 
                     clock = end_session.time()
                     span, steps = steps_at * h if math.isnan(clock) else clock, int(np.floor(steps_at))
                     return End(steps, _finish_at((end_session, steps_at)), span, steps_at > steps, stopped=True)
-    except BackendError:  # the run itself will meet the same error and report it
+    except BackendError:  # the run itself fails at this step too, and reports the error
         pass
     return None
 

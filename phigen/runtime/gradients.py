@@ -55,9 +55,8 @@ class Jacobian(NamedTuple):
 class Segment:
     """Part of a run that is differentiated at once: ``count`` steps, which begin after step number ``first``.
 
-    ``rows`` are the numbers of the rows of the trajectory in this part. There is a row after every ``stride`` steps of
-    the part, and one after its last step. If the steps between two rows are divided into several parts, only the last
-    of these parts has a row.
+    ``rows`` are the numbers of the trajectory's rows in this part. If ``rows`` is not empty, there is a row after every
+    ``stride`` steps of the part, and after its last step. If ``rows`` is empty, the next row comes in a later part.
     """
 
     first: int
@@ -99,7 +98,7 @@ def pullback(
     threads: int | None,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Compute the pullback of a run: the implementation of `Solver.pullback`, with arguments not yet checked."""
+    """Check the arguments of `Solver.pullback`, and compute its result."""
     interface = solver.interface
     start = arguments.states(x0, "x0", interface)
     if start.ndim > 2:

@@ -204,8 +204,8 @@ class LatticeTrajectory:
     to a file, and ``energy`` (frames,) the values of H. The integration made ``steps`` steps of size ``h``, with a
     frame after every stride-th step, or at each given time. The last frame is at the end, which may be inside a step.
     ``observed`` (frames, observables) are the observables that are one number each. ``crossings`` has the states at
-    which the trajectory crosses the section of the run. ``retried`` are the numbers of those steps that failed and were
-    repeated as several smaller steps.
+    which the trajectory crosses the section of the run. ``retried`` are the indices, from 0 on, of those steps that
+    failed and were repeated as smaller steps.
 
     With a monitor (dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without
     a monitor. If the run continues another run, ``joined`` is true and ``tau`` None. ``structure_factor`` and
@@ -400,9 +400,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
     Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), a
     parameter at bonds an array (bonds,); one number holds for all sites or bonds. Parameters that are not passed have
-    the defaults of the spec, evaluated at the sizes of the state. `SpecError` is raised if a default, a list or a file,
-    does not have one value for each site or bond. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of
-    site numbers, which begin at 0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step
+    the defaults of the spec, evaluated at the sizes of the state. If such a default is a list or a file, but does not
+    have one value for each site or bond, `SpecError` is raised. A graph also takes ``bonds`` as an argument, an array
+    (bonds, 2) of site numbers, which begin at 0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step
     `phigen.StepError`. Several threads may use a solver.
     """
 
@@ -459,7 +459,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resumes from that state. The file is removed at the end of the run. ``resume=False`` starts a new run, and
         refuses to overwrite the files of an interrupted one. ``progress`` is called after each frame with the number of
         steps done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step. Raises
-        `ValueError` if the files belong to an interrupted run, or to a complete run, which cannot be resumed.
+        `ValueError` if the call would overwrite files of an interrupted run, or resume a complete run.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -871,8 +871,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
         """Return the initial time, by default 0: a number, or an array (members,) if ``t0`` is an array.
 
-        If H does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. It is then added
-        to ``by_keyword``.
+        If H does not depend on the time, ``t0`` can only be the value of a parameter with the name t0. This value is
+        then added to ``by_keyword``.
         """
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0

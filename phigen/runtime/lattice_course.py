@@ -166,8 +166,8 @@ class LatticeCourse:
 class ObservedCourse(Retrying):
     """An integration whose method `state` returns the observables of the spec, an array (observables,).
 
-    The section and the end (``stop``) of a run are zeros of functions of observables. A failing step is repeated as
-    several smaller steps, see `Retrying`.
+    Functions of observables define the section of a run and, by the key ``stop``, its end. A failing step is repeated
+    as several smaller steps, see `Retrying`.
     """
 
     def state(self) -> Floats:

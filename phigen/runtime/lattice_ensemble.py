@@ -33,9 +33,7 @@ def ensemble(
     t0: Floats,
     draws: Draws,
 ) -> Floats:
-    """Integrate the members of an ensemble: the implementation of `LatticeSolver.ensemble`, with arguments not yet
-    checked.
-    """
+    """Check the arguments of `LatticeSolver.ensemble`, and compute its result."""
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
     }

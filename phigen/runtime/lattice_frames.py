@@ -167,7 +167,7 @@ class Frames:
         return iter(self.array[:count])
 
     def flush(self) -> None:
-        """Write frames that are only in memory to disk."""
+        """Write frames to the disk if they belong to a file; else do nothing."""
         if isinstance(self._array, np.memmap):
             self._array.flush()
 

@@ -30,8 +30,7 @@ def pullback(
     t0: Floats,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Compute the pullback of runs of lattices: the implementation of `LatticeSolver.pullback`, with arguments not yet
-    checked."""
+    """Check the arguments of `LatticeSolver.pullback`, and compute its result."""
     steps = arguments.count(steps, "steps", 0)
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)

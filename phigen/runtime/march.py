@@ -58,9 +58,9 @@ def march(
     pieces.
 
     The length of a piece depends on the speed of the machine; the rows do not. ``is_started`` is true if the initial
-    state was yielded before. ``goes_on`` is true if a shorter step will follow; the state after the last whole step is
-    then not yielded as the last state. ``see_tangent`` receives the derivative (DIM, DIM) of each step. If a step
-    fails, `BackendError` is raised after a piece that ends with the state before that step.
+    state was yielded before. ``goes_on`` is true if a shorter step will follow. Then the state after the last whole
+    step is yielded only if it is a ``stride``-th state. ``see_tangent`` receives the derivative (DIM, DIM) of each
+    step. If a step fails, `BackendError` is raised after a piece that ends with the state before that step.
     """
     size = 1
     if not is_started:
@@ -192,8 +192,8 @@ def _states(
     crossings).
 
     The number is the step number of the first state. There is one `Mark` for each state. With a finder or with
-    ``see_tangent``, the states after all steps are yielded. Otherwise only the states after every ``stride``-th step
-    and after the last step are yielded.
+    ``see_tangent``, the state after each step is yielded. Otherwise only the states after every ``stride``-th step and
+    after the last step are yielded.
     """
     marks: list[Mark] = []
 

@@ -110,8 +110,8 @@ def cores() -> int:
 def parts(members: Members, threads: int) -> Iterator[slice]:
     """Yield the parts of an ensemble, as slices of its members; each part is integrated by one call of C.
 
-    Parts are short, since Python handles Ctrl-C only between two calls. If there are enough members, each of several
-    threads gets about four parts or more.
+    Parts are short, since Python handles Ctrl-C only between two calls. If there are several threads, and enough
+    members, there are about four parts or more for each thread.
     """
     count = len(members)
     batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL

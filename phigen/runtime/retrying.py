@@ -13,8 +13,8 @@ class Retrying(Forwarding[Followed]):
     """Session that repeats a failing step as 2, 4, … equal smaller steps, at most 2^``most``.
 
     Each smaller step is a step of the method: a Poisson map that keeps the Casimirs. The composition of the smaller
-    steps is another map than the whole step. ``retried`` lists the numbers of the steps that were divided. ``steps``
-    counts whole steps.
+    steps is another map than the whole step. ``retried`` lists the indices, from 0 on, of the whole steps that were
+    divided. ``steps`` counts whole steps.
     """
 
     def __init__(self, session: Followed, limit: int) -> None:

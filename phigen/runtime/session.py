@@ -33,7 +33,7 @@ class Course(Protocol):
         ...
 
     def branch(self) -> Self:
-        """Return an independent copy, whose further steps have the same results."""
+        """Return an independent copy; further steps of copy and original have equal results."""
         ...
 
 
@@ -123,7 +123,8 @@ def rows_along(
     """Advance a session from its start by ``steps`` steps, and return the states (rows, DIM) at the rows.
 
     Rows are after 0, stride, 2·stride, … steps, and after the last step. ``see`` is called with the number of each row
-    while the session is at that row. Raises `BackendError`, whose rows end with the state before the failing step.
+    while the session is at that row. Raises `BackendError`, whose ``states`` end with the state before the failing
+    step.
     """
     marks = row_steps(steps, stride)
     start = session.state()

@@ -43,8 +43,8 @@ class Marks:
 
     ``tau`` (rows,) is h times the number of steps. With a monitor (rescaled time: dt = g dτ) this is the rescaled time
     τ, and ``passed`` (rows,) is the physical time since the start. A row of ``turned`` has the components of an
-    attitude and a position. ``steps`` is the number of steps of the whole trajectory. ``retried`` are the numbers of
-    those steps that failed and were repeated as smaller steps.
+    attitude and a position. ``steps`` is the number of steps of the whole trajectory. ``retried`` are the indices, from
+    0 on, of those steps that failed and were repeated as smaller steps.
     """
 
     tau: Floats

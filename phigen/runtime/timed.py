@@ -108,8 +108,8 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
     """Advance a session by the time ``span``, in steps of size h; the last step is shortened.
 
-    ``see`` is called at the start, at every stride-th step, and at the end. Its arguments are the session, and the
-    number of steps so far multiplied by h. Raises `BackendError`.
+    ``see`` is called at the start, at every stride-th step, and at the end. Its arguments are the session, and h times
+    the number of steps made so far. Raises `BackendError`.
     """
     see(session, 0.0)
     steps_done = 0

@@ -32,9 +32,9 @@ class Trajectory:
 
     ``t`` (rows,) are the times, ``x`` (rows, DIM) the states, ``energy`` (rows,) the values of H; ``casimirs`` and
     ``observables`` map names to values (rows,). The integration made ``steps`` steps of size ``h``, with a row after
-    every stride-th step and after the last. If the spec has a monitor, which rescales time by dt = g dτ, h is a
-    step in τ, and ``tau`` (rows,) are the values of τ; otherwise ``tau`` is ``t``. ``retried`` are the numbers of those
-    steps that failed and were repeated as several smaller steps. If the spec says ``reconstruct``, ``attitude`` has a
+    every stride-th step and after the last. If the spec has a monitor, which rescales time by dt = g dτ, h is a step in
+    τ, and ``tau`` (rows,) are the values of τ; otherwise ``tau`` is ``t``. ``retried`` are the indices, from 0 on, of
+    those steps that failed and were repeated as smaller steps. If the spec says ``reconstruct``, ``attitude`` has a
     quaternion (w, x, y, z) or an n × n matrix in each row, and ``position`` has the shape (rows, 3).
     """
 

@@ -63,7 +63,8 @@ class CUDADevice:
         return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
-        """Return the numbers as a struct. CuPy passes a struct to a kernel by value, in constant memory."""
+        """Return an array of constants as a struct, since CuPy passes structs to kernels by value, in constant
+        memory."""
         return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
 
     def write(self, buffer: Any, array: Any) -> None:

@@ -82,8 +82,9 @@ Opened = dict[tuple[int, int | None], Any]
 def choose(names: Sequence[str], target: str, index: int | None) -> int:
     """Return the number of the device to use: ``index`` or, if ``index`` is None, the user's choice.
 
-    The environment variable `CHOICE` names the user's choice, by default device 0. ``names`` are the names of all
-    devices. Raises `DeviceError` if no device has the chosen number or name.
+    The user chooses a device by its number, or by a part of its name, in the environment variable PHIGEN_DEVICE. If the
+    variable is not set, the choice is device 0. ``names`` are the names of all devices. Raises `DeviceError` if no
+    device has the chosen number or name.
     """
     if index is not None and not hasattr(index, "__index__"):
         raise TypeError(f"device is {index!r}, but must be a number; the devices of {target} are {_listed(names)}")

@@ -78,7 +78,7 @@ class DeviceSolver:
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """Return the final states or frames of an ensemble, as `phigen.runtime.backend.Backend.ensemble`.
+        """Return the final states or frames of an ensemble; see `phigen.runtime.backend.Backend.ensemble`.
 
         Members are integrated in batches that fit into the memory of the device. ``threads`` has no effect. Raises
         `TypeError` if ``attitudes`` is passed, and `DeviceError` if the device fails. The ``trajectory`` of the
@@ -124,7 +124,7 @@ class DeviceSolver:
     def _batch(self, members: Members) -> int:
         """Return the number of members in a launch: as many as fit into memory, but at most about a second of work.
 
-        Short runs have at least `_MEMBERS_PER_UNIT` members for each compute unit, if memory suffices.
+        A launch may take longer if it has at most `_MEMBERS_PER_UNIT` members for each compute unit.
         """
         device, rows = self.device, members.steps // members.stride if members.stride else 0
         size = np.dtype(self._real).itemsize

@@ -31,7 +31,7 @@ class MonitoredSession(DeviceLatticeSession):
         """Do nothing. The energy level is computed at the end of ``__init__``, when the arrays on the device exist."""
 
     def _hold_level(self) -> None:
-        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g is not positive there."""
+        """Set the energy level e to −H of the state. Raises `BackendError` unless g > 0 at the state."""
         with np.errstate(all="ignore"):
             try:
                 self._sites.level = self._monitoring._level(self._sites, None)

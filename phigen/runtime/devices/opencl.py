@@ -59,7 +59,7 @@ class OpenCLDevice:
         return int(kernel.get_work_group_info(self._cl.kernel_work_group_info.PRIVATE_MEM_SIZE, self._device))
 
     def constants(self, array: Any) -> Any:
-        """Return the numbers as a kernel argument: a buffer that the kernel reads in the constant address space."""
+        """Return an array of constants as a buffer, which a kernel reads in the constant address space."""
         buffer = self.empty(array.nbytes)
         self.write(buffer, array)
         return buffer

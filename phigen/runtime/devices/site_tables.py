@@ -62,7 +62,7 @@ class SiteTables:
         return buffer, count
 
     def arrays(self, launch: SiteLaunch | SumLaunch, colour: int) -> Mapping[str, Any]:
-        """Return the tables that a kernel reads, by the names of its arguments; other arguments are None."""
+        """Return the colour, and the tables that a kernel reads, by the names of the kernel's arguments."""
         starts, other_sites, at_bonds = None, None, None
         if isinstance(launch, SumLaunch) and self.interface.graph:
             starts, other_sites, at_bonds = self._bonds(launch, colour)
@@ -107,9 +107,10 @@ class SiteTables:
         return [np.broadcast_to(self.sites.parameters[name], self.sizes) for name in self.interface.at_sites]
 
     def _on_seams(self, window: int | None) -> Any:
-        """Return a buffer with factors 1 or 0 that say which sites of a selection lie on which boundary seam.
+        """Return a buffer with the weights, 1 or 0, of terms near boundary seams, for each site.
 
-        Returns None if the selection has no sites at boundary seams.
+        ``window`` states the seams on which the terms begin, as in `phigen.ir.nodes.Selection`. If ``window`` is None,
+        the result is None.
         """
         if window is None:
             return None
