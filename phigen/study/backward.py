@@ -126,8 +126,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
     """Return the powers of the step size with which the changes of H̃ with 0, 1, … corrections decrease.
 
-    The step ``h`` of the run is doubled until the changes exceed rounding errors. If the changes never do, the power is
-    infinite.
+    The step ``h`` of the run is doubled until the changes exceed rounding errors. If the changes are rounding errors at
+    all step sizes, the power is infinite.
     """
     observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -154,7 +154,7 @@ class Constancy:
     With m corrections, the changes should decrease with the power ``powers[m]`` of the step size; ``observed[m]`` is
     the measured power. ``errors`` (corrections + 1, rows) are the changes at ``times`` (rows,), up to ``end``, with
     steps of size ``step``. ``sizes`` are step sizes in descending order; ``changes`` (sizes, corrections + 1) has the
-    largest change for each of them.
+    largest change for each step size.
     """
 
     powers: tuple[int, ...]

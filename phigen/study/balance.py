@@ -14,8 +14,8 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ONE, Expression, gradient, total
 
-#: Weights of f, f′, f″, f‴ at the ends of an interval of length 1, for the rule of order 8 and that of order 6. At the
-#: second end, weights of odd derivatives change their sign.
+#: Weights of P and of its first three derivatives at the ends of an interval of length 1. FINE: the rule of order 8.
+#: COARSE: the rule of order 6. At the second end, weights of odd derivatives have the opposite sign.
 FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
@@ -36,10 +36,10 @@ def powers(system: System) -> list[Expression]:
 
 
 def works(t: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """Return the integrals of f between successive times ``t`` (rows,), and estimates of their errors, (rows − 1,)
-    each.
+    """Return the integrals of a function between successive times ``t`` (rows,), and estimates of their errors, (rows −
+    1,) each.
 
-    ``f`` (4, rows) has the values of f and of its first three derivatives.
+    ``f`` (4, rows) has the values of the function and of its first three derivatives.
     """
     h = np.diff(t)
 

@@ -66,7 +66,7 @@ def strong_order(
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
-    """Return the number of failed steps with the largest possible increments of the noise.
+    """Make steps with the largest possible increments of the noise, and return the number of steps that fail.
 
     `SIGNS` steps are made from the state ``x0``. The signs of the increments are random.
     """
@@ -85,9 +85,9 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """Return a solver of the lattice whose vector field is that of the noise source ``name``.
+    """Return a solver for the noise source ``name``: its Hamiltonian replaces H, and there is no noise.
 
-    The vector field is σ π∇g, where σ is the amplitude and g the Hamiltonian of the source.
+    The vector field of the solver is σπ∇g, where σ is the amplitude and g the Hamiltonian of the source.
     """
     source = spec.noise[name]
     quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)

@@ -35,8 +35,8 @@ from phigen.symbolic.arrays import Floats, evaluate
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
-#: Largest accepted relative errors on a small lattice. IDENTITY: of the Poisson identity. DIFFERENCES: of tangent maps,
-#: compared with finite differences of order 6.
+#: Largest accepted relative errors on a small lattice. IDENTITY: error of DΦ π DΦᵀ = π∘Φ. DIFFERENCES: error of tangent
+#: maps, compared with finite differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
 #: Largest number of sites for which gradients are measured on the whole lattice.
 MOST_GRADED = 16384
@@ -219,7 +219,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Yield the checks of the energy or of the energy balance: of its largest error, and of its drift.
+    """Yield two checks of the energy, or of the energy balance: the largest error, and the drift.
 
     If ``errors`` has only the change of the energy, there is one check, which reports the largest change without a
     limit. ``least`` is the relative error that rounding may cause.
@@ -440,7 +440,7 @@ class _SmallLattice:
         """Return the largest difference between the tangent map of a step and finite differences of order 6.
 
         The difference is relative to the largest entry of the tangent map. ``units`` has a unit for each number of a
-        state. In this unit the number is measured, and displaced by ``apart``.
+        state. In the finite differences, each number is displaced by ``apart`` times its unit.
         """
 
         def step(y: Floats) -> Floats:

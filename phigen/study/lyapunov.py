@@ -1,9 +1,9 @@
 """Lyapunov exponents of a trajectory, through the exact tangent map of each step.
 
 A frame of tangent vectors is propagated by the tangent maps of the steps, and made orthonormal by a QR decomposition
-after each step. The diagonal entries of R measure the growth of the tangent vectors. The sums of their logarithms,
-divided by the time, are the exponents (G. Benettin et al., Meccanica 15 (1980); K. Geist, U. Parlitz, W. Lauterborn,
-Prog. Theor. Phys. 83 (1990)). The exponents are those of the map of a step, not of the exact flow.
+after each step. The diagonal entries of R measure the growth of the tangent vectors. The exponents are the sums of the
+logarithms of these entries, divided by the time (G. Benettin et al., Meccanica 15 (1980); K. Geist, U. Parlitz, W.
+Lauterborn, Prog. Theor. Phys. 83 (1990)). The exponents are those of the map of a step, not of the exact flow.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 
 
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
-    """Return the final states of runs up to the time ``end``, by their numbers of steps, in increasing order.
+    """Return a dict from numbers of steps, in increasing order, to the states at the time ``end``.
 
     Numbers of steps are increased until rounding dominates the error, or until a run takes longer than `MOST_SECONDS`.
     Runs that fail, or whose error is as large as the solution, are left out.

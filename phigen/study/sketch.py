@@ -116,8 +116,8 @@ class Sketch:
         broken: bool = False,
         observables: tuple[str, ...] = (),
     ) -> Trajectory:
-        """Return the stored rows, in their order, as a trajectory. If the run was ``broken`` off, a row of NaN
-        follows."""
+        """Return the stored rows as a trajectory. If the run has failed (``broken``), a row of NaN is added, whose time
+        is one step later."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
         stored_rows = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]

@@ -92,7 +92,7 @@ def _along_lines(
 
 
 def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
-    """Return the number of failed steps with the largest possible increments of the noise.
+    """Make steps with the largest possible increments of the noise, and return the number of steps that fail.
 
     `SIGNS` steps are made from each of the ``states``. The signs of the increments are random.
     """

@@ -32,10 +32,10 @@ from phigen.symbolic.expression import Expression
 ORDER_SLACK = 0.3
 #: An observed strong order may be smaller than the stated one by at most this, since few paths are used.
 STRONG_SLACK = 0.2
-#: Each correction of the modified Hamiltonian should raise the power of h with which its changes decrease. The observed
-#: power may be too small by at most this fraction of the rise due to the last correction.
+#: Each correction of the modified Hamiltonian H̃ should raise the power of h with which the changes of H̃ decrease. The
+#: observed power may be too small by at most this fraction of the rise due to the last correction.
 MODIFIED_SLACK = 0.6
-#: Largest accepted error in three checks of single steps: of the Poisson identity, of reversibility, and of the
+#: Largest accepted error in three checks of single steps: of the identity DΦ π DΦᵀ = π∘Φ, of reversibility, and of the
 #: agreement of targets. Errors are relative to the size of the compared values.
 ONE_STEP = 1e-13
 #: Largest accepted difference between the tangent map and finite differences of a step. The errors of the finite
@@ -394,7 +394,7 @@ def _recurrent(rows: Floats) -> bool:
 
 
 def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of single steps from ``states``: of Poisson identity, tangent map and reversibility."""
+    """Yield the checks of single steps from ``states``: of DΦ π DΦᵀ = π∘Φ, of the tangent map, and of reversibility."""
     system, parameters = subject.compilation.system, subject.parameters
     settings = [(x, f * subject.h) for x in states for f in (1.0, 0.5, -1.0)]
 
