@@ -95,7 +95,7 @@ def build(spec: Spec, system: System | None, setting: Setting) -> Built:
 def built(compilation: Compilation, setting: Setting, start: float) -> Built:
     """Generate the code of a compilation, C if there is a compiler, else NumPy, and compile the C.
 
-    ``start`` is the time, as of `time.perf_counter`, at which the build began.
+    ``start`` is the value of `time.perf_counter` at which the build began.
     """
     program, target = compilation.program, chosen_target("auto")
     files = emit(program, target, f"phigen build {program.name}.yaml")
@@ -116,7 +116,7 @@ def build_all(
 ) -> Iterator[tuple[Setting, Outcome]]:
     """Build several settings, and yield each with its outcome as soon as it is known.
 
-    Builds that are not finished at the ``deadline``, a time as of `time.perf_counter`, are ended and refused.
+    Builds that are not finished at the ``deadline``, a value of `time.perf_counter`, are ended and refused.
     """
     waiting, running = list(settings), dict[Connection, tuple[Setting, Any, float]]()
     context: Any = multiprocessing.get_context("fork" if sys.platform != "win32" else "spawn")

@@ -73,7 +73,7 @@ class Comparison:
     """Results of all methods on one run over the time ``horizon``.
 
     ``equal`` says what the methods have in common: ``step``, the step size, or ``work``, the processor time. ``unit``
-    says to what energy errors are relative (`Unit.kind`). ``clock`` is the variable in which steps have equal size, t
+    is the kind of the unit of energy errors (`Unit.kind`). ``clock`` is the variable in which steps have equal size, t
     or τ.
     """
 
@@ -111,8 +111,8 @@ def compare(
     """Measure methods on one run: the setting of the spec, all other settings of these ``orders``, RK4 and DOP853.
 
     ``compilation`` must have been made with tangent maps. If ``equal`` is ``work``, all methods take the same processor
-    time: their step sizes are chosen so that a run costs as much as that of the setting of the spec. The comparison
-    takes about ``budget`` seconds. Raises `StepError` if the setting of the spec cannot make the run.
+    time: their step sizes are chosen so that each run costs as much as the run with the setting of the spec. The
+    comparison takes about ``budget`` seconds. Raises `StepError` if the setting of the spec cannot make the run.
     """
     start = time.perf_counter()
     current = own_setting(compilation)

@@ -220,7 +220,7 @@ def compare(
     """Build the ``requested`` settings, and find for each the number of steps that reaches the accuracy.
 
     The first setting has no monitor; None is returned if it cannot be built. ``states`` (rows, DIM) are samples of the
-    motion. ``span`` is the duration of the runs, ``deadline`` a time as of `time.perf_counter`.
+    motion. ``span`` is the duration of the runs, ``deadline`` a value of `time.perf_counter`.
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
     outcomes = dict(build_all(spec, system, requested, building))
@@ -245,8 +245,9 @@ def _trial(
 ) -> Trial:
     """Return the result of a candidate: the fewest steps with an energy error of at most ``accuracy``.
 
-    The step is halved until the error is small enough. The last two step sizes are interpolated by their errors, and a
-    run is made with the step size between them. Its result is returned if its error is small enough.
+    The step is halved until the error is small enough. Then a run is made with a step size between the last two, which
+    is interpolated from their errors. If the error of this run is too large, the result of the last halving is
+    returned.
     """
     solver = Solver(candidate.solver(), candidate.interface)
     h, previous = _largest(solver, problem, states), (math.nan, math.inf)

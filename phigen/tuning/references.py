@@ -88,11 +88,11 @@ def agreed(
 def orbit_error(
     states: Floats, spacing: float, reference_method: CompiledMethod, step: float, seconds: float
 ) -> float | None:
-    """Return the largest distance between ``states`` (rows, DIM), at multiples of ``spacing``, and a reference
-    solution.
+    """Return the largest distance of ``states`` (rows, DIM) from a reference solution.
 
-    The distance is relative to the largest coordinate. The reference solution is computed by another method, with steps
-    of at most ``step``. The result is None if the reference does not become accurate enough within ``seconds``.
+    The times of the states are multiples of ``spacing``. The distance is relative to the largest coordinate. The
+    reference solution is computed by ``reference_method``, with steps of at most ``step``. The result is None if the
+    reference solution does not become accurate enough within ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
     orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)

@@ -256,8 +256,8 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 
 
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
-    """Measure the setting of the spec with the step of the run, and return the result. Returns None if the run fails or
-    there is no time for it.
+    """Measure the setting of the spec with the step of the run, and return the result. Returns None if the run fails,
+    or if there is no time for the run.
     """
     h = tuner.problem.step
     span = confirming_span(tuner, current, h) if tuner.clock.left(CONFIRMED) > 0 else 0.0

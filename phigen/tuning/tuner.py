@@ -23,7 +23,8 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 #: builds. SCANNING: largest duration of measuring one candidate with several steps. REFERRING: largest duration of
 #: computing a reference solution. GUESSING: candidates with a longer expected build are left out of the first round.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
-#: SCANNED: share of the time budget after which no candidate is measured. COMPARED: the same for classical methods.
+#: SCANNED: share of the time budget after which no candidate is measured. COMPARED: share after which no classical
+#: method is measured.
 SCANNED, COMPARED = 0.9, 0.85
 #: The measurement of a method ends if reaching the accuracy costs more than a multiple of the least cost so far. WORTH:
 #: this multiple for candidates. WORTH_KNOWING: this multiple for classical methods.
@@ -35,7 +36,7 @@ Notify = Callable[[str], object]
 
 
 class TimeBudget:
-    """The number of seconds that a search may take, counted from ``start``, a time as of `time.perf_counter`.
+    """The number of seconds that a search may take, counted from ``start``, a value of `time.perf_counter`.
 
     The default of ``start`` is the present time.
     """
@@ -44,7 +45,7 @@ class TimeBudget:
         self.budget, self.start = budget, time.perf_counter() if start is None else start
 
     def at(self, share: float) -> float:
-        """Return the time, as of `time.perf_counter`, at which this share of the budget is used up."""
+        """Return the value of `time.perf_counter` at which this share of the budget is used up."""
         return self.start + share * self.budget
 
     def left(self, share: float) -> float:
@@ -132,7 +133,7 @@ class Tuner:
 
     def peers(self) -> list[Curve]:
         """Measure the classical methods with several steps, and return their curves. Returns [] if there is no time for
-        it.
+        the measurements.
         """
         current = next(iter(self.tried.values()))
         if self._race is None and current.seconds > self.clock.left(COMPARED):
@@ -248,8 +249,8 @@ class Tuner:
     def _reference(self, method: CompiledMethod) -> Reference:
         """Return the reference solution over the time span of the search, confirmed by DOP853.
 
-        If rounding errors or chaotic motion prevent this, the time span of the search is shortened. Raises `CheckError`
-        if that does not help.
+        If DOP853 does not confirm the solution, for instance since the motion is chaotic, the time span of the search
+        is shortened. Raises `CheckError` if a shorter time span does not help.
         """
         problem, second, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
