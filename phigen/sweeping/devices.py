@@ -23,7 +23,7 @@ def own_device(target: str) -> int | None:
     """Return the number of the device that this worker process uses; None for the default device.
 
     Dask numbers the workers of a machine, and consecutive workers use consecutive devices. If the environment variable
-    named by `CHOICE` is set, it selects a device for all workers, and the result is None.
+    PHIGEN_DEVICE is set, it selects a device for all workers, and the result is None.
     """
     if target not in registry.DEVICES or os.environ.get(CHOICE):
         return None

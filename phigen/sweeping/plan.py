@@ -93,7 +93,7 @@ class Plan:
         return tuple(range(0, self.steps + 1, self.frames)) if self.frames else ()
 
     def statistics(self, observables: Collection[str]) -> dict[str, Statistic]:
-        """Return the statistics of observables that are stored, by their keywords, such as M or mean(M)."""
+        """Return the statistics of observables that the sweep stores, by keyword, such as M or mean(M)."""
         read = {word: Statistic.read(word, observables) for word in self.keep}
         return {word: statistic for word, statistic in read.items() if statistic is not None}
 

@@ -72,7 +72,7 @@ def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: 
 
 
 def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> Floats:
-    """Return the standard errors of the means of observables over the rows, (members, observables).
+    """Return the standard error (members, observables) of each mean that `_moments` returns.
 
     The standard errors follow from the means of blocks of rows. ``numbers`` are the step numbers of the rows.
     """
