@@ -33,12 +33,12 @@ GRADIENT = "gradient"
 #: Largest number of sweeps (fixed-point iterations) for a step or for a linear equation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds at which two iterations end: the sweeps of a step, and the sweeps that solve a linear equation. The values
-#: are those for double precision.
+#: Thresholds, in double precision, at which an iteration ends. POLICY: the sweeps of a step. LINEAR_POLICY: the sweeps
+#: that solve a linear equation.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
-#: Data of a run between two steps: the state x, the compensation term of x, and increments that predict the next step.
-#: These increments are those of the last step, converted to a step that starts at x.
+#: Data of a run between two steps: the state x, the compensation term of x, and a prediction of the increments of the
+#: next step. The prediction is computed from the increments of the last step.
 Carry = tuple[Any, Any, Any]
 
 

@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint of the error message for brackets for which no Gauss step is known to be a Poisson map.
+#: Hint in the error message for a bracket: no Gauss step is known that is a Poisson map for the bracket.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 

@@ -146,11 +146,11 @@ def _real(value: Any, argument: str) -> Any:
 def _linear(
     apply: Callable[[Any], Any], transpose: Callable[[Any], Any], arguments: Any, shape: tuple[int, ...]
 ) -> Any:
-    """Return ``apply(arguments)`` for a linear map A. JAX shall compute the transpose of A by the function
-    ``transpose``.
+    """Return ``apply(arguments)``, with ``transpose`` as the function by which JAX computes cotangents.
 
-    ``shape`` is the shape of the result. JAX accepts a function for the transpose only if A solves a linear equation.
-    So A v, with v = ``arguments``, is computed as the part y of the solution (u, y) = (v, A v) of a trivial equation.
+    ``apply`` is a linear map A, ``transpose`` is Aᵀ, and ``shape`` is the shape of the result. JAX accepts a transpose
+    only for maps that solve linear equations. So a trivial equation is solved, whose solution is the pair (v, A v) with
+    v = ``arguments``.
     """
     # JAX requires that all parts of the equation depend linearly on the arguments, even a right-hand side that is 0. So
     # this zero is computed from the arguments, and is added.
@@ -178,8 +178,8 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Finds the axes that `vmap` adds in front of the arguments of a run. For this, it stores the numbers of axes
-    that arguments have without `vmap`.
+    """Finds how many axes `vmap` has added in front of each argument of a run. The object stores how many axes each
+    argument has without `vmap`.
     """
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
