@@ -28,8 +28,10 @@ ENDS = ("a", "b")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The numbers of a ``.csv`` file as ``rows``. ``names`` are the column names in the first line of the file, or ()
-    if the file has none.
+    """The numbers of a ``.csv`` file.
+
+    ``rows`` has the numbers. ``names`` has the column names in the first line of the file; it is () if the file has no
+    column names.
     """
 
     path: Path
@@ -37,7 +39,9 @@ class NumberTable:
     rows: Floats
 
     def line(self, row: int) -> str:
-        """Return the text "line N" for row ``row`` of the numbers, for messages."""
+        """Return the text "line N" for messages, where N is the number of the line that contains row ``row`` of the
+        numbers.
+        """
         with opened_text(self.path) as stream:
             line_numbers = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
         return f"line {line_numbers[row + bool(self.names)]}"
@@ -65,8 +69,8 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
     """Return the bonds in a ``.csv`` file, and the columns of parameters by name.
 
-    The bonds are an array of shape (bonds, 2); each row has the two sites that a bond connects. ``parameters`` are the
-    names that the file may have as columns. Without column names, the file has two columns of sites.
+    The bonds are an array of shape (bonds, 2); each row has the two sites that a bond connects. ``parameters`` has the
+    names that columns of parameters may have. A file without column names has two columns of sites.
     """
     table = _table(path)
     names = table.names or ENDS

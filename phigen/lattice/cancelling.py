@@ -52,8 +52,8 @@ class SumFactors:
     """The common factor of the forces that bonds or pairs exert on one field.
 
     The factor is a product of powers of parameters that have a value at every site and may be 0. Solvers sum the forces
-    without this factor, and then multiply the sum by ``at_site``, the factor at the site. ``at_end`` is the same
-    factor, written for a bond or pair whose end a is the site: it maps symbols such as ``m[a]`` to their exponents.
+    without this factor, and then multiply the sum by ``at_site``, the factor at the site. ``at_end`` states this factor
+    for a bond or pair whose end a is the site, as a map from symbols such as ``m[a]`` to their exponents.
     """
 
     at_site: Expression = ONE

@@ -26,13 +26,13 @@ PERIODIC, OPEN = "periodic", "open"
 class Cell:
     """A lattice of identical sites, defined by its fields, brackets and energy densities at one site.
 
-    ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` for each axis.
-    Graphs and pairs have neither. ``bracket`` maps (f, g) to {f, g}, where f is a field at the site and g the symbol of
-    a field at the site or at a neighbour. It contains all nonzero brackets, in both orders. ``bond_bracket`` maps
-    ("f[a]", "g[b]") to the bracket {f[a], g[b]} along a bond; it has all nonzero brackets along bonds, in both orders.
-    ``hamiltonian`` is the energy density of a site, ``bond_hamiltonian`` the energy of a bond from a to b, and
-    ``pair_hamiltonian`` the energy of a pair. H is the sum of all three over all sites, bonds and pairs. Terms that
-    reach beyond an open end are left out (see `terms`).
+    ``axes`` has the names of the axes of a grid. In arrays, the index along the first axis varies slowest. ``boundary``
+    is `PERIODIC` or `OPEN` for each axis. Graphs and pairs have no axes. ``bracket`` maps (f, g) to {f, g}, where f is
+    a field at the site and g the symbol of a field at the site or at a neighbour. It contains all nonzero brackets, in
+    both orders. ``bond_bracket`` maps ("f[a]", "g[b]") to the bracket {f[a], g[b]} along a bond; it has all nonzero
+    brackets along bonds, in both orders. ``hamiltonian`` is the energy density of a site, ``bond_hamiltonian`` the
+    energy of a bond from a to b, and ``pair_hamiltonian`` the energy of a pair. H is the sum of all three over all
+    sites, bonds and pairs. Terms that reach beyond an open end are left out (see `terms`).
 
     ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
     ``invariants`` are sums over sites. ``time`` is the symbol of t in H and in the invariants; it is "" if nothing
@@ -101,8 +101,7 @@ class Cell:
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
-        """Return the field or parameter that a symbol stands for, by name, and the offset of the site at which the
-        symbol has its value.
+        """Return the name of the field or parameter that a symbol stands for, and the offset of its site.
 
         Raises `KeyError` for symbols of any other kind.
         """
@@ -127,7 +126,10 @@ class Cell:
 
     @cached_property
     def terms(self) -> tuple[Expression, ...]:
-        """The additive terms of the energy density of a site. A term is omitted where it reaches beyond an open end."""
+        """The additive terms of the energy density of a site.
+
+        H omits a term at the sites where the term reaches beyond an open end.
+        """
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
@@ -208,8 +210,8 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """Return the terms of ∂H/∂f at a site of a grid, for each field f: one for each term of H that reads f at this
-    site.
+    """Return the terms of ∂H/∂f at a site of a grid, by field f. Each term of H that reads f at this site gives one
+    term.
     """
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:

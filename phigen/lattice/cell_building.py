@@ -15,9 +15,9 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """The number of sites along an axis in a run, if it is not a multiple of the period of the colours.
+    """A number of sites that is not a multiple of the period of the colours.
 
-    ``size`` is this number. ``fitting`` is a multiple of ``period`` near ``size``.
+    ``size`` is the number of sites along an axis in a run. ``fitting`` is a multiple of ``period`` near ``size``.
     """
 
     run: str
@@ -184,7 +184,7 @@ def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
 
 
 def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
-    """Yield an error for each source of noise whose Hamiltonian names neighbours."""
+    """Yield an error for each source of noise whose Hamiltonian depends on neighbouring sites."""
     for name, source in spec.noise.items():
         if any(offset != cell.origin for _, offset in cell.places(source.hamiltonian).values()):
             message = f"noise: {name} acts at single sites, so its Hamiltonian must not name neighbours"

@@ -1,8 +1,9 @@
 """Search for the parts V of H = T + V on a lattice that can be the potential of a Nyström method.
 
-On grids, the flow of the modified potential V + κ{V, {V, T}} is computed too; see `phigen.splitting.kicks`. The bracket
-{F, G} of two sums F and G over sites is again a sum over sites s. A field f at the site s and a field g at the site s +
-d contribute the term ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d) if their bracket {f, g}(s) is not 0.
+On grids, the flow of the modified potential V + κ{V, {V, T}} with a number κ is computed too; see
+`phigen.splitting.kicks`. The bracket {F, G} of two sums F and G over sites is again a sum over sites s. A field f at
+the site s and a field g at the site s + d contribute the term ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d) if their bracket {f,
+g}(s) is not 0.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Bi-realisations (α, β) on a lattice: α and β at a site depend on covectors p in its neighbourhood.
 
-Suppose that brackets are between fields of one site only. Then one site is a system of its own, and any symmetric
-bi-realisation of this system in closed form can be used. If π couples neighbours, it must be constant after a change of
-coordinates that replaces each field f by φ(f), where φ(f) is f or log f. Let π' and p' be π and the covector in the new
-coordinates, and D = π'p', a sum over neighbouring sites. Then α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). These formulas cover
-constant π, log-canonical π, and the brackets of the Toda lattice.
+Suppose that brackets are between fields of one site only. Then one site is a system of its own, and any bi-realisation
+of this system can be used if it is symmetric and in closed form. If π couples neighbours, it must be constant after a
+change of coordinates that replaces each field f by φ(f), where φ(f) is f or log f. Let π' and p' be π and the covector
+in the new coordinates, and D = π'p', a sum over neighbouring sites. Then α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). These
+formulas cover constant π, log-canonical π, and the brackets of the Toda lattice.
 """
 
 from __future__ import annotations

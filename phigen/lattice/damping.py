@@ -1,11 +1,13 @@
 """Flows of damping at sites, as parts of the splitting of a lattice: ẋ = λππb with b = ∇H and the damping coefficient
 λ.
 
-The covector b depends on neighbours, which are damped too. Therefore b is written as a sum of two parts, each with its
-own flow. The first part has the terms that do not depend on the site itself. This part has an elementary flow as long
-as the neighbours stand still. So sites are coloured such that no two neighbours have the same colour, and the flow is
-applied to one colour after the other. The second part has the remaining terms, which depend on the fields of the site.
-The flow of the second part is applied to all sites at once.
+The covector b depends on neighbours, which are damped too. Therefore b is written as a sum b₁ + b₂. For each summand,
+the field λππb has a flow of its own.
+
+b₁ has the terms that do not depend on the site itself. Its flow is elementary if the neighbours stand still. So sites
+are coloured such that neighbours have different colours, and the flow is applied to one colour after the other.
+
+b₂ has the terms that depend on fields of the site. Its flow is applied to all sites at once.
 """
 
 from __future__ import annotations
@@ -69,7 +71,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
     fixed_slopes, own_slopes = _slopes(cell)
     sums = _sums(cell)
-    _flow(cell, fixed_slopes, [0], sums)  # raises the error if there is no flow with any colouring
+    _flow(cell, fixed_slopes, [0], sums)  # raises _NoFlowError if no colouring has a flow
     for colour in _colours(cell, colouring, fixed_slopes):
         flow = _flow(cell, fixed_slopes, [colour], sums)
         if colouring.seams and colour is not None:
@@ -100,7 +102,7 @@ def _slopes(cell: Cell) -> tuple[Covector, Covector]:
 
 
 def _sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over bonds in ∂H/∂f at the sites of the colour that is damped.
+    """Return the sums over bonds that occur in ∇H at a damped site.
 
     Raises `_NoFlowError` if a sum contains fields of the damped site itself.
     """
@@ -137,7 +139,7 @@ def _flow(
 ) -> CellFlow:
     """Return the flow of damping ẋ = w λππb at the sites of ``colours``, with the damping coefficient λ.
 
-    ``covector`` is b, the part of ∇H that is treated, and ``weight`` is w. ``sums`` are the sums over bonds in b.
+    ``covector`` is b, which has some terms of ∇H, and ``weight`` is w. ``sums`` are the sums over bonds in b.
     """
     site_fields, n = SiteFields(cell), cell.fields
     fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}

@@ -103,9 +103,9 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
     """Return the integrals of the power P, each from the first time to another time, and an estimate of their error.
 
-    ``values`` has P at equidistant times, ``h`` apart. There is one integral to each of these times or, if
-    ``row_positions`` is passed, one for each of its entries. An entry is a time in units of ``h``, counted from the
-    first time. It need not be a whole number. Beyond the last value, the last polynomial is extrapolated.
+    ``values`` has P at equidistant times, ``h`` apart. Without ``row_positions``, the upper limits of the integrals are
+    these times. Otherwise they are the entries of ``row_positions``, in units of ``h`` from the first time. An entry
+    need not be a whole number. Beyond the last value, the last polynomial is extrapolated.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())

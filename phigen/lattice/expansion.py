@@ -122,8 +122,8 @@ class Expansion:
         return {pair: e for pair, e in sums.items() if not e.is_zero}
 
     def casimirs(self) -> dict[str, Expression]:
-        """Return the Casimirs by name. A Casimir of the cell is a density: this density stands for a sum or a product
-        over sites, or for one Casimir at each site.
+        """Return the Casimirs by name. The cell states a Casimir by a density. The Casimir is the sum or the product of
+        the density over all sites, or each site has a Casimir.
         """
         casimirs: dict[str, Expression] = {}
         plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)
@@ -285,7 +285,7 @@ def _decimal(value: float) -> Fraction:
 def _unused_name(name: str, site: Site, used_names: set[str]) -> str:
     """Return a name such as ``x_1_2`` for ``x`` at site (1, 2), and add the name to ``used_names``.
 
-    Underscores are appended while the name is used already.
+    If the name is used already, underscores are appended until the name is new.
     """
     candidate = "_".join([name, *map(str, site)])
     while candidate in used_names:

@@ -40,7 +40,7 @@ ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
 #: Classes of terms in a part: terms at all sites and bonds; terms at bonds that begin at sites of one colour; terms at
 #: bonds that end at sites of one colour.
 WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
-#: The end of a bond that has the colour of the part, for each class of terms.
+#: For each class of terms: the end of a bond at which the site has the colour of the part.
 _CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
 
 _OTHER = {"a": "b", "b": "a"}
@@ -273,7 +273,7 @@ def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
     """Merge the sums over the bonds that begin at a site with the sums over the bonds that end there.
 
     The result has one element if the summands are proved to be equal, otherwise one for each end. Sums that are 0 are
-    left out. Sums with ``chosen`` = "here" are never merged.
+    left out. Sums with ``chosen`` = "here" (see `BondSum`) are never merged.
     """
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
@@ -295,9 +295,7 @@ def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expressio
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the forces that a bond exerts on a site, as `_forces_at`, without those that do not occur in the vector
-    field.
-    """
+    """Return those results of `_forces_at` that occur in the vector field."""
     read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
     return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 
@@ -306,7 +304,8 @@ def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expre
     """Yield the terms of a rate of change, each as a pair: a monomial in the fields of this site, and its
     coefficient.
 
-    The monomial is written in the symbols of a site. The coefficient may depend on the opposite end of the bond.
+    In the rate, a field of this site is written ``x[a]``; in the monomial, it is written ``x``. The coefficient may
+    depend on the opposite end of the bond.
     """
     ring = bracketless_ring([cell.at(f, ("a",)) for f in cell.fields], [rate])
     site_symbols = {cell.at(f, ("a",)): symbol(f) for f in cell.fields}

@@ -47,7 +47,9 @@ class LatticeSystem:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the axes of a grid, the slowest first; none for graphs and pairs."""
+        """Names of the axes of a grid; () for graphs and pairs. In arrays, the index along the first axis varies
+        slowest.
+        """
         return self.cell.axes
 
     def _repr_latex_(self) -> str:

@@ -4,8 +4,8 @@ invariants.
 On a grid the statements are decided on the infinite lattice. A periodic box is a quotient of the infinite lattice by
 translations, so statements on brackets and sums are true on the box too. A lattice with open ends is a part of the
 infinite lattice. If the functions on this part are closed under brackets, which is the usual case, the Jacobi identity
-and Casimirs of single sites remain true. Casimirs and invariants that are sums are examined on a box so large that no
-term reaches both ends.
+holds there too, and Casimirs of single sites are still Casimirs. Casimirs and invariants that are sums are examined on
+a box so large that no term reaches both ends.
 
 On a graph, each term of a residual depends on at most two bonds. So a statement is true for every graph if it is true
 for all graphs of one or two bonds. If all pairs of sites interact, a statement is true for every number of sites if it

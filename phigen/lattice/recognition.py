@@ -48,8 +48,8 @@ class _SiteNames:
     """The fields and sites that names stand for.
 
     ``sites`` maps names to (field, site): the names of coordinates, and of parameters that differ from site to site.
-    ``space`` has the symbols of neighbours on the lattice. ``point`` has the values of symbols at which terms are
-    compared.
+    ``space`` has the symbols of neighbours on the lattice. Terms are compared by their values at one point; ``point``
+    maps symbols to their values at this point.
     """
 
     fields: tuple[str, ...]
@@ -61,9 +61,10 @@ class _SiteNames:
 
 
 def recognised_lattice(spec: Spec, least: int) -> Spec | None:
-    """Return the spec of a lattice that is equal to an ordinary spec, if the lattice has at least ``least`` sites.
+    """Return a spec with the key ``lattice`` for the system of an ordinary spec, which lacks this key.
 
-    Returns None if phigen recognises no lattice, or if the brackets of the spec are not valid.
+    Returns None if the names of coordinates show fewer than ``least`` sites, if phigen recognises no lattice, or if the
+    brackets of the spec are not valid.
     """
     if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
         return None
@@ -75,7 +76,7 @@ def recognised_lattice(spec: Spec, least: int) -> Spec | None:
 
 
 def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
-    """Return the spec of a lattice that is equal to an ordinary spec with the matrix π = ``poisson``.
+    """Return a spec with the key ``lattice`` for the system of an ordinary spec with the matrix π = ``poisson``.
 
     Returns None if phigen recognises no lattice, and for systems with forces, noise or a time-dependent H.
     """
@@ -211,8 +212,8 @@ def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Para
 def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> tuple[Site, Expression]:
     """Return the site at which a term is placed, and the term translated from there to the origin.
 
-    The site is ``base`` if this argument is passed. Otherwise it is the first corner of the smallest box that contains
-    the sites of all symbols in the term.
+    The site is ``base`` if this argument is passed. Otherwise it is the site at which the smallest box begins that
+    contains the sites of all symbols in the term.
     """
     places = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
     if base is None:
@@ -225,7 +226,7 @@ def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> t
 
 
 def _start(sites: set[int], size: int, boundary: str) -> int:
-    """Return the first site of the shortest interval along an axis that contains all ``sites``; a periodic axis wraps
+    """Return the first site of the shortest interval that contains all ``sites``, along one axis. A periodic axis wraps
     around.
     """
     if boundary == "open":

@@ -103,7 +103,8 @@ class SeriesPlan:
     def acting(self, forces: SpecForces) -> str:
         """Return a text for the header of generated files that says how forces act.
 
-        Covector forces ζ are added to ∇H; vector forces f act in two halves.
+        Covector forces ζ are added to ∇H. Half of the impulse hf of a vector force f acts before a stage, and half
+        after it.
         """
         return "p = h (grad H + zeta)" + ", and half of the impulse h f before and after a stage" * bool(forces.vector)
 

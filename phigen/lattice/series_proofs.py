@@ -1,8 +1,9 @@
 """Proofs that the series on a lattice is correct, repeated at each build.
 
 The axioms of the bi-realisation (α, β) are proved at one site if all brackets are between fields of one site. Otherwise
-they are proved on a periodic box. Together, the sites that α reads at two neighbouring sites do not reach around the
-box. By translation, the proof then holds for every larger box.
+they are proved on a periodic box. If brackets couple sites up to the distance r along an axis, the box has 4r + 1 sites
+along this axis. The sites that α reads at two sites with the distance 2r do not reach around this box. At larger
+distances, α reads different sites. So the proof holds for every larger box, by translation.
 
 Two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p = h∇H
 the increment is hπ∇H up to O(h²). Since a stage is also symmetric, its order is 2.

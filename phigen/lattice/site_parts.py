@@ -141,10 +141,10 @@ class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
     The ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or
-    pairs. ``gathered`` lists the sums; symbols `GATHERED` stand for them. ``solution`` has the same increments, with a
-    symbol `FORCE` in place of each component of the gradient of the part. These increments solve ẋ = ``rates``. For
-    damping, ``components`` has the values of the symbols `FORCE`, since the force is not the gradient of a part.
-    ``manner`` describes the motion in words.
+    pairs. ``gathered`` lists the sums; symbols of the kind `GATHERED` stand for them. ``solution`` has these increments
+    with symbols of the kind `FORCE`, which stand for the components of the gradient of the part. The increments in
+    ``solution`` solve ẋ = ``rates``. For damping, ``components`` has the values of the symbols of the kind `FORCE`,
+    since the force is not the gradient of a part. ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -213,7 +213,7 @@ class CellFlow(Flow):
 
 @dataclass(frozen=True)
 class CellSplitting:
-    """The flows of the parts of H, and the ``colouring`` of sites on which the parts are based."""
+    """The flows of the parts of H, and the ``colouring`` of sites with which the parts were found."""
 
     flows: tuple[CellFlow, ...]
     colouring: Colouring
@@ -500,7 +500,9 @@ class PartSearch:
         return solution
 
     def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
-        """Raise `NoPartError` if the equation of motion of a site reads neighbours that move in the same part."""
+        """Raise `NoPartError` if the equation of motion of a site reads fields of neighbours that change along the
+        flow.
+        """
         moving = {f for f, e in rates.items() if not e.is_zero}
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):

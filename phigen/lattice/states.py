@@ -173,7 +173,9 @@ class _Reader:
 
 
 class _Arrays:
-    """Reader of values of a spec as arrays over the sites or bonds of a lattice with the given ``sizes``.
+    """Reader that makes arrays over sites or bonds from the values that a spec states.
+
+    ``sizes`` are the numbers of sites along the axes of the lattice.
 
     ``run`` is the name of the run whose values are read. Error messages end with ``hint``.
     """

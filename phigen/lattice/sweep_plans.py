@@ -73,11 +73,12 @@ class SplittingPlan:
     parts: CellSplitting
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
-    since: str = ""  # reason for boundary seams (irregular colours), or for more colours than the minimum
+    since: str = ""  # reason for boundary seams, or for more colours than necessary; "" if there is none
     negative: int | None = None  # with a monitor: index of the part of H that is negative
     bodies: LatticeBodies | None = None  # the bodies, if the spec asks for relative coordinates
 
-    #: The name of the scheme in specs, and of the method for users. A step is a sequence of explicit flows.
+    #: ``scheme`` is the name of the scheme in specs, ``kind`` the name of the method for users. A step is a sequence of
+    #: explicit flows.
     scheme = kind = "splitting"
     label = "splitting of a lattice"
     is_implicit, site_kind, weak_order = False, None, 2
@@ -95,7 +96,7 @@ class SplittingPlan:
 
     @property
     def colouring(self) -> Colouring:
-        """The colouring of the sites on which the parts are based."""
+        """The colouring of the sites with which the parts were found."""
         return self.parts.colouring
 
     @property
@@ -234,8 +235,8 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
     """Return the method with additional flows for the terms that begin on boundary seams, where the colours do not
     repeat.
 
-    The flows on seams follow directly after the flow of the same part of H on all other sites. For the last part the
-    order is reversed: its flow on all other sites comes after its flows on seams.
+    The flows on seams follow the flow of their part of H on all other sites. In the last part of H, they precede this
+    flow.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()

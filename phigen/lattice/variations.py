@@ -15,8 +15,8 @@ from phigen.symbolic.symbols import GATHERED, INITIAL, VARIATION, Symbol, kind_o
 def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
     """Return the directional derivatives of values, as expressions in the symbols of the variations.
 
-    These symbols are `variation` for each field that the values read, and `varied_sum` for each sum over bonds or
-    pairs.
+    The functions `variation` and `varied_sum` return these symbols, for each field and for each sum over bonds or pairs
+    that the values read.
     """
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
