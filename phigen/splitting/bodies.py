@@ -76,7 +76,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
     pairs.
 
     Raises `_NoBodiesError` if H contains no attracting bodies, or if one of them has no momentum, no kinetic energy, or
-    no attraction by a body before it.
+    no attraction by an earlier body. Bodies are in the order of their coordinates.
     """
     distances = [d for g in ring.tower.generators if is_inverse_distance(g) for d in [_distance(ring, g)] if d]
     if not distances:
@@ -120,9 +120,9 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
 
 
 def _distance(ring: Ring, generator: Generator) -> _Distance | None:
-    """Return the distance of two bodies if its inverse is the variable ``generator`` of the ring.
+    """Return the distance |q_a − q_b| of two bodies if ``generator`` is the variable 1/|q_a − q_b| of the ring.
 
-    Returns None if the argument of the root is not a sum of squares of differences of two coordinates.
+    Returns None if ``generator`` is the inverse root of any other expression.
     """
     (argument,) = generator.arguments
     support, tower = ring.support(argument), ring.tower
@@ -141,7 +141,7 @@ def _distance(ring: Ring, generator: Generator) -> _Distance | None:
 def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
     """Return one list for each axis: the indices of the coordinates along this axis, in ascending order.
 
-    ``pairs`` are pairs of coordinates whose difference occurs in H; two such coordinates lie along one axis.
+    ``pairs`` are pairs of coordinates whose difference occurs in H; the two coordinates of a pair lie along one axis.
     """
     axes: list[set[int]] = []
     for pair in pairs:

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Bounds for a list of monomials w with ẇ = Aw. MOST_DEGREE is the largest degree of a monomial. MOST_MONOMIALS is the
-#: largest number of monomials in the list; if all of them are single coordinates, it is MOST_COORDINATES. Lists beyond
-#: these bounds are treated as infinite.
+#: Bounds for a list of monomials w with ẇ = Aw. A monomial has at most the degree MOST_DEGREE. A list of single
+#: coordinates has at most MOST_COORDINATES entries, any other list at most MOST_MONOMIALS. Lists beyond these bounds
+#: are treated as infinite.
 MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]

@@ -61,8 +61,7 @@ class Conflicts:
         return conflicts
 
     def grouped(self, terms: Sequence[Term]) -> list[list[Term]]:
-        """Return the terms in groups of commuting terms; the number of groups is the number of colours of the conflict
-        graph."""
+        """Return the terms in groups of commuting terms. Each group has the terms of one colour (see `coloured`)."""
         neighbours = self.graph(terms)
         colours = coloured(neighbours, [self.support(t) for t in terms])
         return [[t for t, c in zip(terms, colours, strict=True) if c == k] for k in sorted(set(colours))]

@@ -6,8 +6,8 @@ A closed form exists if powers of A satisfy one of these relations, in which c a
 - A^{a+1} = dA^a: exp(tA) = Σ_{k<a} (tA)^k/k! + A^a/d^a Σ_{k≥a} (td)^k/k!.
 - A^{a+2} = −cA^a for a = 1 or 2: a similar formula, with sin and cos of t√c, or with sinh and cosh.
 
-If d depends on the state, A/d may be 0/0 where d vanishes, and then A^a/d^a is not in the ring. In this case the
-quotients are replaced by the entire functions of `phigen.symbolic.entire`, which are also valid for both signs of c.
+If c or d depends on the state, a quotient by c or d may be 0/0 at states where c or d vanishes. Then entire functions
+of `phigen.symbolic.entire` take the place of the quotients. The functions of ct² are valid for both signs of c.
 """
 
 from __future__ import annotations
@@ -231,8 +231,9 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
 def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
     """Return d with a = d·b for two matrices a and b, or None if the ring contains no such d.
 
-    d is found by polynomial division. The division fails if reciprocals in the entries have been cancelled. Therefore
-    the diagonal entries of ``guess`` are tried too.
+    d is found by polynomial division of an entry of a by an entry of b. If reciprocals have been cancelled in the
+    entries, the division may leave a remainder. Therefore the diagonal entries of the matrix ``guess`` are also tried
+    as d.
     """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):

@@ -235,8 +235,7 @@ def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _increments(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
-    """Return the increments along a vector field from its equations as they are, or the reason why there is no
-    solution.
+    """Return the increments along a vector field, or the reason why there is no solution. First integrals are not used.
 
     Linear equations are solved by the given ``methods``; unless ``linear``, equations of a single coordinate are solved
     too.

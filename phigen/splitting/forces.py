@@ -6,11 +6,11 @@ not know the flow of πζ, its summands πζ_i dx_i are parts, one for each comp
 f, the components of f are parts. The field πζ_i dx_i is the Hamiltonian field of x_i times a factor. It is tangent to
 the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping is ζ = λπb with b = ∇H. If phigen does not know its flow, each block of π has flows of its own, for the field
-λππb with the components of b in this block. If phigen does not know the flow of this field, b is divided into two sums:
-the terms that do not depend on the coordinates of the block, and all other terms. If phigen does not know the flow for
-the second sum, each component of the second sum has a flow of its own. Finally, flows are combined into one part if
-none of them changes a coordinate that another one reads.
+Damping is ζ = λπb with b = ∇H. If phigen does not know the flow of damping, each block of π has flows of its own, for
+the field λππb with the components of b in this block. If phigen does not know the flow of this field, b is divided into
+two sums: the terms that do not depend on the coordinates of the block, and all other terms. If phigen does not know the
+flow for the second sum, each component of the second sum has a flow of its own. Finally, flows of damping are combined
+into one part if none of them changes a coordinate that another flow reads.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _damping_flows(system: System, damping: Expression) -> list[Flow]:
 
 
 def _merged_flows(flows: Sequence[Flow]) -> Flow:
-    """Return several flows as one flow; none of them may change a coordinate that another one reads or changes."""
+    """Return several flows as one flow; none of them may change a coordinate that another flow reads."""
     increment, force = (
         tuple(total(entries) for entries in zip(*vectors, strict=True))
         for vectors in ([f.increment for f in flows], [f.force for f in flows])

@@ -4,8 +4,9 @@
 terms changes neither m nor N, and rotates other vectors about N. Terms are summed if monomials of their vector fields
 cancel.
 
-*Linear terms.* In Σ v_i m_i let all v commute with each other and with all m. Then v is constant along the flow, and m
-satisfies linear equations: the flow is a rotation about v, a shear, or another linear action of the algebra.
+*Linear terms.* In Σ v_i m_i let all v_i commute with each other and with all m_i. Then the v_i are constant along the
+flow, and the m_i satisfy linear equations: the flow is a rotation about the vector v, a shear, or another linear action
+of the algebra.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    # A relation has the coefficients c_k of a sum Σ c_k ẋ_k that is 0. The last of them is 1, and its coordinate occurs
-    # in no other relation.
+    # A relation has the coefficients c_k of a sum Σ c_k ẋ_k that is 0. Its last coefficient is 1, and the coordinate of
+    # this coefficient occurs in no other relation.
     for relation in relations:
         pivot = moving[max(relation)]
         other_terms = total(

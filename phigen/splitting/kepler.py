@@ -137,7 +137,7 @@ class _Orbit:
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)
-        # With this order of the factors, both changes contain the same rounded products, so the flow stays canonical.
+        # With this order of the factors, q' and p' contain the same rounded products, so the flow stays canonical.
         towards = self.inverse_mass * (self.strength * g2)
         pull = inverse * inverse_end * (self.strength * g1)
         q_change = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]

@@ -3,8 +3,8 @@
 The condition holds if T is like a kinetic energy: quadratic in the coordinates that the flow of V changes. Brackets
 need not be canonical. A canonical example is T = p²/2 with a potential V(q). An example on se(3)* is a quadratic form T
 of the angular momenta with a function V of the direction of gravity. By the condition, many repeated brackets of T and
-V vanish, so a method has fewer order conditions. V also commutes with {V, {V, T}}. So V + κ{V, {V, T}} may have an
-elementary flow as well: a kick with modified potential.
+V vanish, so a method has fewer order conditions. V also commutes with {V, {V, T}}. So V + κ{V, {V, T}} with a number κ
+may have an elementary flow as well: a kick with modified potential.
 
 The bracket is {f, g} = ∇f·π∇g. With the opposite sign, {V, {V, T}} is the same, since it contains two brackets.
 """

@@ -5,9 +5,9 @@ also contain values that are constant along the flow but change from step to ste
 Each monomial with a value of this kind is then a further unknown: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as
 the third unknown.
 
-Matrix exponentials are computed by scaling and squaring. If ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 for
-exp(A/2^s) − 1 is F = 2(V − U)⁻¹U, where V is the even and U the odd part of its numerator. The map F ↦ 2F + F² takes
-exp(A) − 1 to exp(2A) − 1, and preserves all digits for small A.
+Matrix exponentials are computed by scaling and squaring. The number s is so large that ‖A/2^s‖ ≤ 1/2. The Padé
+approximant of order 6 for exp(A/2^s) − 1 is F = 2(V − U)⁻¹U. V is the even part and U the odd part of the numerator.
+The map F ↦ 2F + F² takes exp(A) − 1 to exp(2A) − 1, and preserves all digits for small A.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ def _invariants(system: System, ring: Ring) -> list[Poly]:
 
 
 def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
-    """Return the number of invariants that are not constant along the flows of all parts.
+    """Return the number of invariants that change along the flow of at least one part.
 
     For example, s_1 + s_2 is constant along the flow of s_1·s_2, but not along that of x_1 x_2.
     """

@@ -1,6 +1,6 @@
 """Flows of a single coordinate in closed form: ż = r(z) with a nonlinear function r, whose coefficients are constant.
 
-For each form of r, this is the coordinate after the time t:
+For each of the following forms of r, with constants a, b, c, k and n, the coordinate after the time t is:
 
 - r = az² + bz + c: z + r T/(1 − (az + b/2)T) with T = tanh(wt)/w and w² = b²/4 − ac, written by the entire functions
   cosroot and sinroot
