@@ -2,10 +2,10 @@
 
 A star algebra is an associative algebra with an involution *. Its skew elements a (a* = −a) contain the Lie algebra.
 
-Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1.
-S is a g-module of symmetric elements (f* = f) such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is
+Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S
+is a g-module of symmetric elements (f* = f) such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is
 spanned by a central skew element z, and is only needed for sl(n) and su(n). S is an eigenspace of the Casimir operator
-on Sym² g. The products of elements of g with a, b in g and f in S are
+on Sym² g. For a and b in g and f in S, the products are
 
     ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a).
 
@@ -216,8 +216,8 @@ class _Module:
     def products(self) -> list[fmpq_mat] | None:
         """Return the matrices of left multiplication by the basis elements of the star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-        Returns None if the factors c, μ, ν or the isomorphism ι in the products of A do not exist; see the head of the
-        module.
+        Returns None if the factors c, μ, ν or the isomorphism ι in the products of A do not exist; see the text at the
+        head of this file.
         """
         m, d = len(self.ad), len(self.tensors)
         lowered = [self.form * s * self.form for s in self.tensors]
@@ -254,7 +254,7 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> tuple[fmpq, fmpq, fmpq] | None:
-        """Return the factors c, μ, ν in the products of the star algebra; see the head of the module.
+        """Return the factors c, μ, ν in the products of the star algebra; see the text at the head of this file.
 
         The factors solve linear equations for a few pairs of elements of the Lie algebra. Returns None if there is no
         solution. A solution may still violate axioms of a star algebra; `enveloping` checks these at the end.
@@ -356,8 +356,8 @@ class _Module:
     ) -> fmpq_mat:
         """Return the matrix of left multiplication by the central element z.
 
-        The matrix follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z); see the head of the module. Here a is an element of
-        the Lie algebra, and f an element of S with ⟨a, f⟩ ≠ 0.
+        The matrix follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z); see the text at the head of this file. Here a is an
+        element of the Lie algebra, and f an element of S with ⟨a, f⟩ ≠ 0.
         """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
@@ -431,8 +431,7 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # The star algebra has the basis 1, [g, g], S, z. Row k of ``basis`` is number row_numbers[k] of these basis
-    # elements.
+    # The star algebra has the basis 1, [g, g], S, z. In this order, row k of ``basis`` has the number row_numbers[k].
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

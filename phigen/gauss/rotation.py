@@ -2,8 +2,8 @@
 
 A dual quaternion q + εr with ε² = 0 stands for the rotation q and the translation 2r q̄. The homomorphism maps the
 basis elements of the Lie algebra that generate rotations to ½i, ½j, ½k or, for the opposite sign of the brackets, to
-−½i, −½j, −½k. It maps the basis elements that generate translations to ε times the same quaternions, and all others to
-0.
+−½i, −½j, −½k. It maps the basis elements that generate translations to ½εi, ½εj, ½εk or, for the opposite sign, to
+−½εi, −½εj, −½εk. It maps all other basis elements to 0.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _element(
         total(algebra.field.expression(image[k]) * z for image, z in zip(images, offsets, strict=True) if image[k])
         for k in range(8)
     ]
-    if attitude.spatial:  # then G acts on the attitude from the left, by its inverse
+    if attitude.spatial:  # then a step multiplies the attitude by G⁻¹ from the left
         w = [w[0], *(-v for v in w[1:4]), w[4], *(-v for v in w[5:])]
     inverse = [ONE + w[0], *(-v for v in w[1:4])]
     translation = quaternion_product(w[4:], inverse)[1:]

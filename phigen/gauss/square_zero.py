@@ -9,7 +9,7 @@ x̃(G(b + c)G*) = λ(bg*) + κ(cg*), since x̃(gbn*) = x̃(nbg*). Here λ(b) = x
 If Ġ = G(e + v) with e in B and v in N, then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So the derivatives of g and λ depend on
 g and λ alone, and λ is a linear function of G. Gauss methods commute with linear maps, so a method with the unknowns g
 and λ makes the same step as with the unknown G. The number of these unknowns is 2 dim B. For the motion of a body, N
-consists of the translations, or of the directions of several fields, and (g, λ) is a point of T*B.
+has the translations, or the directions of several force fields. Then (g, λ) is a point of T*B.
 """
 
 from __future__ import annotations

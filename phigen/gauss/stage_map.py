@@ -44,8 +44,8 @@ class StageMap:
     ``unknowns`` are names of symbols. Their order is: the offsets of the coordinates with the indices ``moved``; the
     offset of the time if H depends on the time; the offsets of the functionals λ of star algebras with ideals; the
     offsets of the logarithms of the coordinates with the indices ``scaled``; the components of the group elements,
-    minus 1 or minus the frame F. ``places`` has one tuple for each group: the indices of the unknowns of the group
-    element, then those of the functional. ``change`` is x − x_start for each coordinate.
+    minus 1 or minus the frame F. ``places`` has one tuple for each group element: the indices of its unknowns, then the
+    indices of the unknowns of its functional λ. ``change`` is x − x_start for each coordinate.
     """
 
     system: System
@@ -65,9 +65,7 @@ class StageMap:
 
     @property
     def plain(self) -> int:
-        """The number of unknowns for coordinates, time and functionals. These unknowns come first, and scale with the
-        state.
-        """
+        """The number of unknowns for coordinates, time and functionals. These unknowns come first."""
         groups = self.realisation.groups
         return len(self.moved) + len(self.system.times) + sum(len(g.subalgebra) for g in groups if g.ideal)
 
@@ -223,7 +221,7 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
     """Return the changes of the momenta x_a since the start of a step, as functions of the unknowns, without
     cancellation.
 
-    A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and its basis E_a of the Lie algebra. For
+    A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and the basis E_a of the Lie algebra. For
     G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, there is a functional λ =
     x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. With frames, it is
     the change of the quadratic form k̃(U E_a U*).

@@ -154,8 +154,8 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
 
 
 def _functionals(system: System, points: StageMap) -> Statement:
-    """Decide whether a step is the same if functionals λ take the place of some components of group elements as
-    unknowns.
+    """Decide whether two choices of unknowns give the same step: all components of group elements, or functionals λ in
+    place of some components.
 
     With functionals and without them, the changes of coordinates must be equal, and the velocities must be equal.
     Symbols stand for ∇H, so that the statement holds for any H.
@@ -192,8 +192,8 @@ def _differences(
     values: Mapping[str, Expression],
     states: Mapping[str, Expression],
 ) -> list[tuple[str, Expression]]:
-    """Return the differences between the steps of two sets of unknowns: differences of the changes of x and of the
-    velocities.
+    """Return the differences between two steps that have different unknowns. The changes of x and the velocities are
+    compared.
 
     The symbols "slope" stand for ∇H. So if the differences are 0, the steps are equal for any H. ``values`` has the
     unknowns of ``points`` as functions of the unknowns of ``reference``; ``states`` replaces coordinates at the start

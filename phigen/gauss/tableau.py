@@ -21,8 +21,9 @@ DIGITS = 60
 #: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: Width of the frequency band for which the predictor of a Gauss step is optimal: motions with angular frequencies up
-#: to BAND/h times the number of stages. Methods with more stages are used with longer steps, so their band is wider.
+#: Width of the frequency band for which the predictor of a Gauss step is optimal: the band has the angular frequencies
+#: up to BAND·s/h, with s stages and the step size h. Methods with more stages are used with longer steps, so their band
+#: is wider.
 BAND = Fraction(1, 4)
 
 
