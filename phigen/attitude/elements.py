@@ -93,7 +93,7 @@ def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
     For a rotation about a coordinate axis without translation, the quaternion is (1, tan(|r|/2)) with the tangent along
     the axis. This quaternion is the cheapest, since the flow computes sin and cos of the angle |r| anyway. It is not of
     unit length, but products of elements are normalised at the end of a step. With a translation, the quaternion uses
-    sin and 1 − cos of half the angle. The increments of the flow then use the same functions (see
+    sin and 1 − cos of half the angle. The increments of the flow are then computed from these functions too (see
     `phigen.attitude.flow_elements.by_angles`).
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]

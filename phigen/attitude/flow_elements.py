@@ -6,8 +6,9 @@ exp(t∇R), times the rotation by C. The rotation by C does not change x, and th
 to h. So the rotation by C is applied once in a step.
 
 With forces, a monitor, or a time in H, the rotation by C is not uniform. Then the element of each flow has a factor for
-C. The same holds for a Casimir in the Hamiltonian of a noise source. If a flow is composed of commuting flows, its
-element is the product of their elements. Elements of free rigid bodies are in `phigen.attitude.free_bodies`.
+C. If the Hamiltonian of a noise source contains a Casimir, the element of the flow of this source has a factor for it.
+If a flow is composed of commuting flows, its element is the product of their elements. Elements of free rigid bodies
+are in `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
@@ -158,8 +159,8 @@ def turning_of(
 def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning]:
     """Yield ways to write h as a sum.
 
-    The first way is h alone. In other ways, a multiple of |m|²/2 or of a Casimir is one term, and the rest of h is the
-    other. m is the angular momentum.
+    The first way is h alone. Each other way has two terms: a multiple of a Casimir or of |m|²/2 with the angular
+    momentum m, and the rest of h.
     """
     yield Turning(ZERO, (h,))
     if not group.matrices and group.vectors:
@@ -191,7 +192,7 @@ def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expres
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
-    """Decide whether the gradients of all summands in ``turning.factors`` are constant along certain flows.
+    """Decide for all summands in ``turning.factors`` whether their gradients are constant along the necessary flows.
 
     The gradient of a summand must be constant along the flows of this summand and of all summands before it.
     """

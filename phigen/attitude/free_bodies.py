@@ -8,7 +8,7 @@ of unit length,
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
 Let l, m, h be the axes with the lowest, the middle and the highest value of the E_i in `phigen.splitting.euler`, which
-also defines P, R, S, C, D, κ and z. Let L = |x|, and
+also defines P, R, S, C, D and κ. Let z = Pκ² and L = |x|, and
 
     β_l = w_h − w_m,  β_m = w_l − w_h,  β_h = w_m − w_l,  c = β_h x_m² − β_m x_h²,  n = β_m c ≤ 0,
     W = (β_l x_m² − β_m x_l²)c/L²,  T = 4κ/(1 + z),  Q = P − R.
@@ -168,8 +168,9 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
     """Yield a label and an expression for the angle θ.
 
-    This module states formulas for θ and for θ̇. The expression vanishes if the time derivative of the first is the
-    second. ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest E_i.
+    This module states formulas for θ and for θ̇. The expression vanishes if the formula for θ̇ is the time derivative
+    of the formula for θ. ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest
+    E_i.
     """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")

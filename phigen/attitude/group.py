@@ -86,7 +86,7 @@ def group_of(system: System, requested: str, kind: str) -> Group:
     """Return the group of attitudes of a system for the value ``requested`` of ``reconstruct``, quaternion or matrix.
 
     ``kind`` is the kind of the bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if phigen knows no group
-    of this kind for its Lie algebra.
+    for its Lie algebra.
     """
     algebra = system.lie_algebra
     if algebra is None:

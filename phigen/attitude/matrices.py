@@ -56,7 +56,8 @@ def exponential(group: Group, p: Sequence[Expression]) -> Flat:
 
 
 def cayley(group: Group, p: Sequence[Expression]) -> Flat:
-    """Return the entries of the Cayley transform of P = Σ p_i E_i minus 1: (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
+    """Return the entries of the matrix (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P: the Cayley transform, minus 1, of P = Σ
+    p_i E_i.
 
     Let A = P/2, with N rows, and let e_i be the elementary symmetric functions of its eigenvalues. Then (1 − A)⁻¹
     Σ(−1)ⁱe_i = Σ_k A^k Σ_{i < N−k} (−1)ⁱe_i.
