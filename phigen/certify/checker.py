@@ -30,7 +30,7 @@ ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
 # Each number determines a point of a box, at which derivatives are compared.
 POINTS = (0.318309886, 0.577215665, 0.869604401)
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of other functions
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents errors twice as large as those of the other functions
 # the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
@@ -152,8 +152,8 @@ class Evaluation:
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
             # "rest" adds an error for the omitted terms of a Taylor series. The C may omit the terms a[3:], and omits
-            # all later terms. The error is the sum of the terms a[3:] and of the first later term, times a factor 3,
-            # which covers all other terms.
+            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2], where tail is the first later term. The
+            # factors 3 and 2 cover all other terms; omitted terms are divided by at least a[2].
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -423,7 +423,9 @@ def digest(c: Mapping[str, Any]) -> str:
 
 
 def replayed(c: Any, text: bytes) -> str:
-    """Check a certificate for the C file with this text, and return the proved statement. Raises `RefusedError`."""
+    """Check a certificate for a C file with the content ``text``, and return the proved statement. Raises
+    `RefusedError`.
+    """
     demand(digest(c) == c["sha256"], "the certificate was changed")
     demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
     boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])

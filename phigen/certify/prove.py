@@ -45,7 +45,7 @@ GROWTH = 1.25
 GAUSS_CARRY = 3.03
 
 #: In a Gauss step, each unknown has a bound for the distance of its iterates from the solution. All bounds are at least
-#: this fraction of the largest one, since each iteration couples all unknowns.
+#: this fraction of the largest bound, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
 #: The C may compute derivatives by difference quotients, at points near an iterate. Then the bound for the distance of

@@ -25,7 +25,7 @@ _KEYWORDS = rf"\b({'|'.join(keyword.kwlist)})\b"
 #: Suffix that Python's keywords get while C is parsed as Python. No name in generated C ends in this character.
 _SUFFIX = "π"
 
-#: Statement of splittings with `adjoint: true`: it copies the state, and changes nothing that a step computes.
+#: Line in the C of splittings with `adjoint: true`. It copies the state, and has no effect on the result of a step.
 _TAPE = "if (tape != NULL) memcpy(tape++, x, sizeof *tape);"
 
 
@@ -301,7 +301,8 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Kind of step → names of the C functions that are read. A solver has the first kind whose last function is in its C.
+#: Kind of step → names of the C functions that are read. For a kind, its last function is decisive: a solver has the
+#: first of these kinds for which its C has this function.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
