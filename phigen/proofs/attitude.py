@@ -2,9 +2,9 @@
 
 g₀ and g₁ are the attitudes before and after a step, as group elements, and τ is the attitude increment. If x is the
 momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the momentum in space,
-g₁ = τ g₀, and the momentum in the body is constant. This does not determine τ: a product of τ and a rotation that fixes
-x also conserves the momentum. So a second statement says that the rate of rotation tends to ∇H for h → 0. Here H is the
-Hamiltonian of the spec, from which no Casimirs are subtracted.
+g₁ = τ g₀, and the momentum in the body is constant. The constant momentum does not determine τ: a product of τ and a
+rotation that fixes x also conserves the momentum. So a second statement says that the rate of rotation tends to ∇H for
+h → 0. Here H is the Hamiltonian of the spec, from which no Casimirs are subtracted.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _first_term(compilation: CompiledSeries) -> Expression:
 
 
 def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterator[Statement]:
-    """Yield the statement for a Gauss step: the rate of the group element at the start of the step."""
+    """Yield the statement on the rate of the group element at the start of a Gauss step."""
     system, group = compilation.system, attitude.group
     pace = compilation.gauge.pace(system)
     points = stage_map(compilation.discretised, compilation.gauss, pace)
@@ -118,7 +118,8 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
     """Return the statement that the attitude rotates with ∇H for h → 0, in components of the Lie algebra.
 
     ``slope`` is ∇S_1, the rate of the attitude increment. Gradients of Casimirs that were subtracted from H are added
-    to it. With a ``monitor`` g, which rescales time by dt = g dτ, the sum must equal g∇H where K = g (H − H(x₀)) is 0.
+    to ``slope``. With a ``monitor`` g, which rescales time by dt = g dτ, the sum must equal g∇H where K = g (H − H(x₀))
+    is 0.
     """
     group, velocity = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
     if monitor:
