@@ -102,8 +102,7 @@ class FlowFunctions:
         return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
-        """Return the function that computes the derivative of the increment of a flow with respect to the state, and
-        then applies the flow.
+        """Return the function that first computes the Jacobian of the increment of a flow, and then applies the flow.
 
         The argument ``part`` of the function selects one of ``count`` flows.
         """
@@ -132,9 +131,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow(part, row)`` yields the statements of one flow, where ``row`` is the row of its coefficients. ``rows`` is a
-    variable of the generated code, which refers to the row of the next flow. If ``size`` is None, ``rows`` is the
-    number of this row. Otherwise ``rows`` is the address of this row, and rows have ``size`` coefficients.
+    ``flow(part, row)`` yields the statements of one flow, whose coefficients are in the row ``row``. ``rows`` is a
+    variable of the generated code. If ``size`` is None, it is the number of the row of the next flow. Otherwise it is
+    the address of this row, and each row has ``size`` coefficients.
     """
 
     def further(count: int) -> ir.Value:
@@ -208,10 +207,10 @@ class Transposed:
     """Description of the transposed kernel of one flow. All fields except the last two contain indices.
 
     The kernel computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; contributions to
-    other cotangents are always 0. The kernel also recomputes the values of the coordinates ``before`` at the start of
-    the flow. ``reads`` has the coordinates that the kernel reads, as ranges (first index, length). If ``full_range``,
-    the flow has a second version, in which elementary functions are correct for all arguments. If ``full_range_back``,
-    the transposed kernel has a second version of this kind.
+    other cotangents are always 0. The kernel also recomputes some coordinates at the start of the flow; ``before`` has
+    their indices. ``reads`` has the coordinates that the kernel reads, as ranges (first index, length). If
+    ``full_range``, the flow has a second version, in which elementary functions are correct for all arguments. If
+    ``full_range_back``, the transposed kernel also has a second version.
     """
 
     state: Sequence[int]

@@ -51,7 +51,7 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of a stage. The fields that the function reads are those of the unknown y."""
+        """Return the function of a kernel of a stage. The function reads the fields of y, the unknown of the stage."""
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
@@ -100,7 +100,7 @@ class LatticeLoops:
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
-        """Return the transpose of the function `sums(ends)`; ``kernel`` is the transpose of the kernel of ``ends``."""
+        """Return the transpose of the function `sums(ends)`. ``kernel`` is the transpose of `ends.kernel`."""
         source = "params" if "params" in kernel.inputs else "coef"
         return self._over_ends(ends, kernel, (source,), self._cotangents(kernel))
 
@@ -252,7 +252,7 @@ def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) 
 
 
 def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
-    """Return the symbols of one ``kind`` of weights that kernels read, in the order of their first use. A weight
+    """Return the symbols that kernels read for weights of one ``kind``, in the order of their first use. A weight
     multiplies a term; it is 1 at some sites, and 0 at all others.
     """
     read = (s for kernel in kernels for s in kernel.inputs["present"])
@@ -260,8 +260,9 @@ def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return, for each axis, the least and the largest offset at which a term of H reads values. ``key`` is the key of
-    the symbol for the weight of this term; it consists of these offsets.
+    """Return, for each axis, the least and the largest offset at which a term of H reads values.
+
+    The term has a weight, and the weight has a symbol. ``key`` is the key of this symbol: a list of the offsets.
     """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

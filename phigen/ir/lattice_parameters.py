@@ -79,8 +79,8 @@ def copies(
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
-    """Return the statement that sets the pointers in ``params`` to null, after the arrays of the caller have been
-    copied.
+    """Return the statement that sets the pointers in ``params`` to null. It comes after the loop that copies the
+    arrays of the caller.
     """
     first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
     return ir.Assign(first, NULL, too=tuple(others))
@@ -91,8 +91,8 @@ def sums_of_derivatives(
 ) -> Iterator[ir.Function]:
     """Yield the functions that add derivatives with respect to parameters to arrays of the caller.
 
-    ``bars`` maps the parameters at sites and bonds to the numbers of their cotangent arrays. Parameters with one value
-    for all sites have one derivative each.
+    ``bars`` maps each parameter at sites or bonds to the number of its cotangent array. A parameter with one value for
+    all sites has one derivative.
     """
     numbers = [p for p in parameters if p.at == "all"]
     if numbers:

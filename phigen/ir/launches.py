@@ -15,7 +15,7 @@ class EnsembleLaunch:
     ``group`` is the default number of work items in a work group. ``predictors`` is the number of values that a member
     has in shared memory for its predictor; 0 without a predictor. ``coefficients`` is the number of coefficients that
     members with the same parameters, step and gauge can share; 0 if they share none. ``gauges`` is the number of
-    factors of a gauge; 0 without a gauge.
+    values that are constant for each member: multiples of Casimirs, or the energy level.
     """
 
     group: int = 0
@@ -26,7 +26,7 @@ class EnsembleLaunch:
 
 @dataclass(frozen=True)
 class SumLaunch:
-    """Data for launching a kernel that computes sums over the bonds of each site, or over all other sites.
+    """Data for launching a kernel that computes sums at each site: over its bonds or, for pairs, over other sites.
 
     ``values`` is the number of sums at a site. ``of_parameters`` says that the kernel reads parameters in place of
     coefficients. ``end`` and ``chosen`` select bonds of a site, see `phigen.scheme.steps.Ends`.
@@ -62,8 +62,8 @@ class LatticeLaunches:
     other kernels by name.
 
     ``arrays`` are the names of the array arguments, which follow the first five arguments of all kernels. ``seams`` has
-    a pair (colour, offset) for each weight of terms near boundary seams. ``numbers`` are the parameters with one value
-    for all sites, in the order in which kernels receive them.
+    the pair (colour, offset) of each `phigen.ir.nodes.OnSeam` that kernels read. ``numbers`` are the parameters with
+    one value for all sites, in the order in which kernels receive the values.
     """
 
     parts: tuple[tuple[SiteLaunch, ...], ...] = ()

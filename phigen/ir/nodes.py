@@ -22,9 +22,8 @@ from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: Kinds of symbols for variables that are not in the spec. A variable of either kind is printed with the name that the
-#: builder of the code chose. If the spec has the same name, one of the two variables is renamed: the variable of the
-#: spec for the kind FIXED, the variable of the builder for the kind LABEL.
+#: Two kinds of symbols for variables that the builder of the code has named, not the spec. If the spec uses the name
+#: too, one variable gets another name: with FIXED the variable of the spec, with LABEL the variable of the builder.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -354,8 +353,8 @@ class Store:
 
 @dataclass(frozen=True)
 class Reduce:
-    """Addition of a value at each site to one cotangent: that of a coefficient, or of a parameter with one value for
-    all sites.
+    """Addition of the values at all sites to a single cotangent: that of a coefficient, or that of a parameter with one
+    value for all sites.
     """
 
     source: str  # "coef" or "params"
@@ -564,8 +563,7 @@ Statement = (
 Block = tuple[Statement, ...]
 
 
-#: Parameters of functions before lowering, whose loops are over sites, bonds or pairs. Each target gives them its own
-#: names.
+#: Parameters of functions on the level of sites. Each target has its own names for these parameters.
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)

@@ -113,21 +113,20 @@ class PathFunctions:
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
-        """Return the statements that compute the values of all nodes at one point m. The values are stored in the array
-        e.
-        """
+        """Return the statements that store the values of all nodes at one point m in the array ``e``."""
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
     def field(self) -> ir.Block:
-        """Return the statements that compute ṁ at a point from the values of the nodes in the array e."""
+        """Return the statements that compute ṁ at a point from the values of the nodes in the array ``e``."""
         derivatives = (ir.entry(E, index) for index in self.path.slopes)
         return tuple(ir.Assign(ir.entry(FIELD, i), value) for i, value in enumerate(derivatives))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
         """Return the declarations of the symbols in expressions.
 
-        The value of a series is its coefficient of order 0 or, with ``at_point``, the value of its node in the array e.
+        The value of a series is its coefficient of order 0. With ``at_point``, it is an entry of the array ``e``, which
+        has the values of the nodes at a point.
         """
         used = {*symbols_of(*expressions)}
         listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
@@ -138,8 +137,8 @@ class PathFunctions:
         return [ir.in_place(s, place) for s, place in listed.items() if s in used]
 
     def linear(self, q: NodeSeries) -> ir.Value | None:
-        """Return the sum of the terms ``q.linear`` of a recurrence, each of which is a multiple of a coefficient of
-        another series; None if there are none.
+        """Return the sum of the terms ``q.linear`` of a recurrence; None if there are no terms. Each term is a multiple
+        of a coefficient of another series.
         """
         total: ir.Value | None = None
         for index, factor in q.linear:
@@ -223,9 +222,9 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 
 
 class _LaneLayout(PathLayout):
-    """The places of the values of a path in one lane of the record e.
+    """The places of the values of a path in one SIMD lane. The record ``e`` has the values of all lanes.
 
-    Some series are needed only for the derivatives of the path. They are numbered after the series of the path itself.
+    Some series are needed only for the derivatives of the path. Their numbers follow those of the series of the path.
     """
 
     def __init__(self, path: Recurrences) -> None:
@@ -312,8 +311,8 @@ class _LaneFunctions:
         """Return the function that adds a product to the derivatives of the path. One factor is ∂(π p)/∂m at order j;
         the other factor is the derivatives of the path at order k − j.
 
-        The derivatives are matrices with ``width`` columns in the member ``array`` of e; ``whose`` describes them in
-        the comment.
+        The derivatives are matrices with ``width`` columns, in the member ``array`` of the record ``e``. ``whose``
+        describes the derivatives in the comment.
         """
         statements = list[ir.Statement]()
         for e in jacobian:

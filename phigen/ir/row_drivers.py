@@ -43,9 +43,9 @@ class RowSegment:
     """Statements for one row segment: ``setup`` sets members of its record, and ``calls`` call the loops over its
     sites.
 
-    ``orders`` are declarations that all segments share. The calls change the fields ``updated``, numbers of entries of
-    ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo. The halo has copies of
-    sites beyond both ends of a row.
+    ``orders`` are declarations that all segments share. The calls change some of the fields in ``arrays``; ``updated``
+    has the indices of these fields. After the calls, the ends of the rows of these fields are copied to the halo. The
+    halo has copies of sites beyond both ends of a row.
     """
 
     calls: ir.Block

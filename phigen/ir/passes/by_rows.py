@@ -1,6 +1,6 @@
 """Lowering by rows, for C: a row function runs over the sites of a row segment.
 
-For each array, it receives pointers to the row of the segment and to neighbouring rows.
+For each array, the function declares pointers to the rows that it reads: the row of the segment, and neighbouring rows.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class RowLayout:
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
         """Return the address of row number ``line`` in an array.
 
-        The member ``rows`` of the row record has the offset of each row in memory.
+        ``rows`` is the name of the member of the row record that has the offsets of the rows in memory.
         """
         return arrays if self.single_row else ir.Binary("+", arrays, ir.entry(ir.Member(ROW, rows), line))
 
@@ -70,10 +70,10 @@ class RowLayout:
 class Reading:
     """Options of `RowDeclarations`. They say how a function accesses arrays.
 
-    ``updated`` are the fields that the function writes. ``seeds`` maps kinds of cotangents to the arrays that contain
-    them. With ``local``, the function sums over the bonds of a site in local variables. ``here`` is "a" or "b", the end
-    of the bond or pair at which the site of the loop lies. ``at_bonds`` is the array of parameters at bonds. The
-    parameters ``oriented`` have the opposite sign for the site at the end b.
+    ``updated`` are the fields that the function writes. ``seeds`` maps each kind of cotangents to the arrays with these
+    cotangents. With ``local``, the function sums over the bonds of a site in local variables. ``here`` is "a" or "b":
+    the end of the bond or pair at which the site of the loop lies. ``at_bonds`` is the array of parameters at bonds.
+    The parameters ``oriented`` have the opposite sign for the site at the end b.
     """
 
     updated: frozenset[str] = frozenset()
@@ -105,7 +105,7 @@ class RowDeclarations:
     computed: list[ir.Statement] = field(default_factory=list)
 
     def read(self, body: Iterable[ir.Statement]) -> RowDeclarations:
-        """Record the declarations among some statements, and return this object.
+        """Record the declarations in ``body``, and return this object.
 
         Declarations of temporaries are recorded in ``computed``.
         """

@@ -12,8 +12,8 @@ the following members of this record:
 - ``beside``: the numbers of the sites in or near boundary seams
 - ``inside``: the numbers of all other sites, as a list for each colour and a list for all colours
 - ``colours``: the colour of each site
-- ``sums``: an array for each sum over bonds or pairs, one after another
-- ``dw``: an array for each source of noise, one after another
+- ``sums``: a single array: the first sum over bonds or pairs at all sites, then the second sum at all sites, …
+- ``dw``: a single array: the increments of the first source of noise at all sites, then those of the second source, …
 - an array for each derived value, under its own name; parameters determine these values
 - ``massive``: for sums over pairs, the number of the first site after the last site that has a mass
 

@@ -61,8 +61,8 @@ def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
 def _part(
     reads: Sequence[ir.Statement], chunk: Sequence[ir.Statement], crossing: dict[str, Symbol]
 ) -> list[ir.Statement]:
-    """Return the statements of one part; ``crossing`` maps values that several parts use to entries of the
-    workspace.
+    """Return the statements of one part. ``crossing`` has the values that several parts share, each with its entry of
+    the workspace.
     """
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:

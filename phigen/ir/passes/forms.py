@@ -20,9 +20,9 @@ from phigen.symbolic.special import SPECIAL
 #: versions for all arguments, which the solver defines in place of library functions.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: Versions of elementary functions: SIMD for loops over lanes, IN_LANES for loops over sites. Functions with a
-#: removable singularity are not in IN_LANES: their versions for lanes are polynomials, which loops over sites call only
-#: for small arguments. FULL_RANGE has the members of IN_LANES that are correct for all arguments.
+#: Maps from elementary functions to their versions. SIMD is for loops over lanes, IN_LANES for loops over sites.
+#: IN_LANES omits functions with a removable singularity, since their versions are polynomials for small arguments.
+#: FULL_RANGE has the members of IN_LANES that are correct for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
@@ -51,8 +51,8 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms in which functions are needed: a map from the suffix of a form to the versions of elementary
-    functions that this form calls.
+    """Return the forms in which ``functions`` are printed. The result maps the suffix of each form to the versions of
+    elementary functions that the form calls.
 
     The form "_near" is for small arguments, and "_full_range" for all arguments. ``small_argument`` are the elementary
     functions with a polynomial for small arguments. ``limited`` are the elementary functions whose fast versions fail

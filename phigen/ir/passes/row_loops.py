@@ -77,7 +77,7 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
 
 
 def _from(selection: ir.Selection) -> ir.Value:
-    """Return the first site of a row segment that a sweep updates."""
+    """Return the first site that a sweep updates in a row segment."""
     if not selection.first:
         return FROM
     return ir.Select(ir.Binary("<", FROM, ir.Constant(selection.first)), ir.Constant(selection.first), FROM)
@@ -91,8 +91,8 @@ def of_colour(
     low: ir.Value = FROM,
     **more: Any,
 ) -> ir.Loop:
-    """Return the loop over the sites from ``low`` on. If ``colour`` is not None, the loop runs only over the sites of
-    the colour ``swept``, a value in the generated code.
+    """Return the loop over the sites from ``low`` on. Unless ``colour`` is None, the loop runs only over sites of one
+    colour, which the generated code computes as ``swept``.
     """
     if colour is None:
         return over_sites(body, low=low, **more)
@@ -106,8 +106,8 @@ def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Stat
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return the row function that evaluates a kernel of a stage. If ``adds``, it adds its outputs to the arrays of
-    results, otherwise it assigns them.
+    """Return the row function that evaluates a kernel of a stage. If ``adds``, the function adds the outputs of the
+    kernel to the arrays of results. Otherwise it assigns the outputs.
     """
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 
@@ -118,7 +118,7 @@ def _storing(
     """Return a row function that stores its results in the arrays to which the member ``member`` of the row record
     points.
 
-    ``names`` maps the numbers of the arrays to the names of the pointers to them.
+    ``names`` maps the number of each array to the name of the pointer to this array.
     """
     rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
@@ -130,12 +130,12 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and the ``arguments`` of its row function after ``coef``
-    and ``row``.
+    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its row function.
 
-    ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments may be
-    ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction of a bond at the site where it
-    begins) and ``across`` (a flag: the sites of the swept colour are at the opposite ends of the bonds).
+    ``oriented`` are the parameters at bonds that change sign for the site at the end b. There are three additional
+    arguments: ``at_bonds``, the arrays of parameters at bonds; ``sign``, the direction of a bond at the site where it
+    begins, 1 or −1; and ``across``. If ``across`` is 1, the function omits bonds whose other site does not have the
+    colour of the sweep. If ``across`` is 0, it omits bonds if the site of the loop does not have this colour.
     """
 
     function: ir.Function
@@ -229,7 +229,7 @@ def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
     """Return the row function that sums over the bonds of each site.
 
-    It assigns the sums if it is the ``first`` function that computes them. Otherwise it adds to the present values.
+    If ``first``, the function assigns the sums. Otherwise it adds to the sums that an earlier function has computed.
     """
     reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
     rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.function.loop.stores)
@@ -263,9 +263,9 @@ def bonds_of(
     """Return the loop over the bonds of a site. ``loop.end`` selects the bonds that begin at the site ("a"), the bonds
     that end at the site ("b"), or all bonds of the site ("").
 
-    Bonds are skipped if their end ``loop.chosen`` does not have the colour of the sweep; with ``across``, a flag of the
-    caller decides which end is tested. The direction of a bond is 1 or −1, and opposite at its two ends. It is stored
-    in the variable `SIDE`, and is ``sign`` at the site where the bond begins.
+    If ``loop.chosen`` names a site of a bond, this site must have the colour of the sweep; all other bonds are skipped.
+    With ``across``, a flag of the caller selects the site. The variable `SIDE` is the direction of the bond: ``sign``
+    at the site where the bond begins, −``sign`` at the site where it ends.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
     reads_there = [(name, value) for name, value in rows.other.items() if name in names]

@@ -155,7 +155,9 @@ def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) ->
 def _added_up(
     prefix: str, handed: Sequence[Handed], layout: RowLayout
 ) -> tuple[list[ir.Statement], list[ir.Statement]]:
-    """Return the pointers to contributions that neighbours have stored for a site, and the statements that add them."""
+    """Return two lists: pointers to the contributions that neighbours have stored for a site, and the statements that
+    add these contributions.
+    """
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
     open_rows = prefix == "received" and any(layout.lattice.step.sites.open[:-1])

@@ -1,7 +1,7 @@
 """Temporaries: expression graphs are converted to statements.
 
 Integer powers become products. Values that are used several times, and parts of long expressions, get variables.
-Declarations that nothing reads are removed.
+Declarations of unread values are removed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from phigen.symbolic.expression import Expression
 
 
 def temporaries(function: ir.Function) -> ir.Function:
-    """Return the function with variables for shared values and parts of long expressions, without declarations that
-    nothing reads.
+    """Return the function with variables for shared values and for parts of long expressions. Declarations of unread
+    values are removed.
     """
     function = map_blocks(function, _named)
     read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Update)))

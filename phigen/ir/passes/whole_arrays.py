@@ -183,10 +183,10 @@ class WholeArrays:
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
-        """Return a contribution to a cotangent, as an array over the sites of the values that were read.
+        """Return a contribution to a cotangent. It is an array over the sites whose values were read.
 
-        A value read at an offset contributes at this offset, so the array is shifted. A value read at an end of bonds
-        or pairs contributes the sum over the bonds or pairs of each site.
+        If the values were read at an offset, the array is shifted by this offset. If they were read at an end of bonds
+        or pairs, the contributions to each site are summed over its bonds or pairs.
         """
         if s.end and loop.kind == "bonds":
             return ir.Called("summed", (value, ir.fixed("here" if s.end == "a" else "there")), SITES)
