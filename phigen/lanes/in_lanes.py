@@ -46,10 +46,10 @@ PACKS_PER_GROUP = 4
 MEMBER_BATCHES = 4
 
 #: Largest numbers of stages for which members of an ensemble are integrated in batches. The second number applies if
-#: kernels call functions and the iteration for a single trajectory has only a part of the unknowns
-#: (`phigen.scheme.steps.ReducedSweeps`). In a batch, the iteration has all unknowns, and takes longer. Measured time in
-#: batches, relative to members one by one: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15
-#: with four stages, 0.6 with two.
+#: kernels call functions, and if single trajectories iterate only a part of the unknowns
+#: (`phigen.scheme.steps.ReducedSweeps`). A batch iterates all unknowns, which takes longer. Measured time in batches,
+#: divided by the time without batches: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with
+#: four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -75,9 +75,9 @@ class Blocks:
 
     ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if the kernels call no library
     function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. For steps
-    along paths, ``path`` has the recurrences for the derivatives of a path; their Taylor series have at most
-    ``slope_terms`` terms. ``room`` is the number of values in each lane that a group of members needs, without the
-    values of predictors.
+    along paths, ``path`` has the recurrences for the derivatives of a path. The Taylor series of the derivatives have
+    at most ``slope_terms`` terms. ``room`` is the number of values in each lane that a group of members needs, without
+    the values of predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -120,8 +120,8 @@ class Rows:
     call.
 
     ``small_argument`` are the functions that have a polynomial for small arguments. ``limited`` are the functions in
-    flows and stages whose fast versions may fail at very large arguments: all functions that have a polynomial for
-    small arguments, a vector version, or a formula of vector versions.
+    flows and stages that have a fast version: a polynomial for small arguments, a vector version, or a formula of
+    vector versions. Fast versions may fail at very large arguments.
     """
 
     calls: frozenset[str]
@@ -138,8 +138,8 @@ class Traces:
     """Paths in lanes, for the reverse pass of an integration that takes one step at a time.
 
     ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack. ``calls`` are the
-    functions that the kernels call. ``path`` has the recurrences for the derivatives of a path; their Taylor series
-    have at most ``slope_terms`` terms.
+    functions that the kernels call. ``path`` has the recurrences for the derivatives of a path. The Taylor series of
+    the derivatives have at most ``slope_terms`` terms.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -255,16 +255,16 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        # Without tangent maps and gradients, short code has no kernels of variations: it uses difference quotients of
-        # sweeps.
+        # Without tangent maps and gradients, this code has no kernels that read variations: derivatives along
+        # variations are difference quotients of sweeps.
         if not (program.extras.tangent or step.adjoint):
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
     called_with_forms = _called_in_forms(step)
     called = operations(swept) & called_with_forms
-    # Transposes call the derivatives of these functions at the same small arguments. The names of the derivatives end
-    # with 1.
+    # Transposes call the derivatives of the functions in ``called``, at arguments that are small too. The name of a
+    # derivative is the name of the function followed by 1.
     called |= {f for f in SMALL_ARGUMENT_FUNCTIONS if f in called_with_forms and f.removesuffix("1") in called}
     small_argument = tuple(f for f in (*SMALL_ARGUMENT_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*small_argument, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)

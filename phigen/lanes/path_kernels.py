@@ -83,7 +83,7 @@ def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Seque
 
 
 def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
-    """Return a symbol of a kind for each of ``values``, numbered from 0."""
+    """Return one symbol of this ``kind`` for each of ``values``. The symbols are numbered from 0."""
     return tuple(Symbol(kind, i) for i in range(len(values)))
 
 
@@ -97,9 +97,9 @@ def _resolved(
     """Return two tuples of expressions: the coefficients of order 0 of ``series``, and the values ``fixed``, which are
     constant along a path.
 
-    In the coefficients, symbols of constant values and of earlier series are replaced by their expressions, and the
-    symbols in ``known`` by the expressions there. ``first`` is the number of the first series, and ``first_fixed`` that
-    of the first constant value.
+    The coefficients contain no symbols of constant values, of earlier series, or of ``known``: these symbols are
+    replaced by their expressions. ``first`` is the number of the first series, and ``first_fixed`` the number of the
+    first constant value.
     """
     values_by_symbol = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []
