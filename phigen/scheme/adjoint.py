@@ -155,7 +155,7 @@ def completed(
 
     ``steps`` are the transposed kernels of the step itself. This function adds the transposes of ``prepare``, which
     computes coefficients before the steps, and of ``refresh``, which computes the coefficients that change from step to
-    step. ``prepare`` and ``refresh`` must be built first, when the table of coefficients is full.
+    step. Before this call, the table of coefficients must be complete, and ``prepare`` and ``refresh`` must be built.
     """
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):

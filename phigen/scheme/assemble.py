@@ -184,7 +184,7 @@ def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel
     """Return the kernel ``prepare``, which computes the coefficients.
 
     Coefficients are values that depend only on parameters, gauge and step size. The kernel must be built last, when the
-    table of coefficients is full.
+    table of coefficients is complete.
     """
     held = ", the energy level" if gauge.monitor else ", gauge" if gauge.inputs else ""
     return Kernel(

@@ -117,8 +117,8 @@ def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[E
     """Return the outputs of a kernel for the group element of the covector p.
 
     The group element is the exponential of p, or the Cayley transform of p if ``cayley``. The outputs are its entries,
-    minus those of the identity. The exponential in a group of matrices is an exception: another kernel computes it. For
-    that kernel, the outputs are the components of p, and a bound for the squared norm of the matrix of p.
+    minus those of the identity. In a group of matrices, another kernel computes the exponential. The outputs are then
+    the arguments of the other kernel: the components of p, and a bound for the squared norm of the matrix of p.
     """
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
@@ -148,8 +148,8 @@ def flow_attitude(
     """Return the attitude of a splitting.
 
     The result has one kernel for each flow, which computes the increments of the flow and the group element of the step
-    up to the end of this flow. ``increments`` has first the increments of the flows of the noise sources, then those of
-    ``flows``. With a monitor, ``time_of`` returns the physical time of a flow. The coefficients of the kernels are
+    up to the end of this flow. ``increments`` has the increments of all flows: first those of noise sources, then those
+    of ``flows``. With a monitor, ``time_of`` returns the physical time of a flow. The coefficients of the kernels are
     added to ``coefficients``. Raises the errors of `turnings`.
     """
     flow_rotations = turnings(system, group, flows, put_back=uniform(system))
@@ -203,8 +203,8 @@ def rate_kernel(
     subtracted.
 
     This function is the sum of the Casimirs of the gauge, multiplied by their λ, and of the functions with the
-    gradients ``further_gradients``. Raises `SpecError` if there is such a function together with a monitor or forces,
-    since the rotation by the Casimirs is then not uniform.
+    gradients ``further_gradients``. Raises `SpecError` if a function is subtracted although there is a monitor, or
+    although there are forces: then the rotation by the Casimirs is not uniform.
     """
     subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]

@@ -42,7 +42,7 @@ class ScheduledMethod:
     """A splitting method, and the parts of H in the order in which a step applies their flows.
 
     If the method has modified kicks, their Hamiltonian V + κ{V, {V, T}} is the part in place of V. ``why`` is the
-    reason of the choice, as text for the user. If H depends on the time, ``carrier`` is the number of the part during
+    reason for the choice, as text for the user. If H depends on the time, ``carrier`` is the number of the part during
     whose flow the time advances. If no part has this number, the time advances separately, after all flows.
     """
 
@@ -142,7 +142,7 @@ def is_dated(flow: Flow, time: str) -> bool:
 def planned(
     system: Host, splitting: SplitHamiltonian, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> ScheduledMethod:
-    """Return the splitting method for the ``requested`` order, as `plan` does, for a spec or a system.
+    """Return the splitting method for the ``requested`` order, for a spec or a system; see `plan`.
 
     ``kicks_of`` returns the parts that can be V in H = T + V for a Nyström method. It is called only if a Nyström
     method is considered.
@@ -207,7 +207,9 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
-    """Return the error for a composition for near-integrable systems, if no part of H is known to be small."""
+    """Return the error for a near-integrable composition, if no part of H is known to be small or there are not two
+    parts.
+    """
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"this H has {count} part{'s' * (count > 1)}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
@@ -216,7 +218,7 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
 
 
 def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kick) -> ScheduledMethod:
-    """Return the Nyström method for H = T + V, with T and V in the order of its step, and the reason of the choice as
+    """Return the Nyström method for H = T + V, with T and V in the order of its step, and the reason for the choice as
     text."""
     return ScheduledMethod(order, method, _arranged(splitting, method, kick), _why(method))
 

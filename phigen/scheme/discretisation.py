@@ -24,7 +24,7 @@ from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP
 
-#: Largest number of operations in one kernel; larger programs are refused.
+#: Largest number of operations in one kernel. A program with a larger kernel is refused.
 MOST_OPERATIONS = limits.OPERATIONS
 
 #: Part of the hint in errors about the size of a program: an alternative to a lower order.

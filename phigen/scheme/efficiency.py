@@ -31,10 +31,9 @@ WAITING_COORDINATES, MOST_PARALLEL = 2.6, 2.4
 NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 #: Nanoseconds of a step by Newton's method for each entry of its matrix.
 NEWTON_ENTRY = 8.0
-#: Nanoseconds of a Gauss step with eight stages in SIMD lanes, summed over all sweeps. The first two numbers are those
-#: of an arithmetic operation in the vector field, and of an elementary function in it. The third is that of the
-#: remaining work of a step, and the fourth that of a change to the frame of the next step. With up to four stages the
-#: operations take half of the time.
+#: Nanoseconds of a Gauss step with eight stages in SIMD lanes, summed over all sweeps: for each arithmetic operation in
+#: the vector field, for each elementary function in the vector field, for all other work of a step, and for the change
+#: to the frame of the next step. With up to four stages, operations and elementary functions take half of the time.
 STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
 #: Time of a division, in units of an addition.
 DIVISION = 4

@@ -77,7 +77,7 @@ def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) ->
 
 
 class TooManyError(Exception):
-    """Raised by a count as soon as the number of operations exceeds the limit."""
+    """Error of a count that has exceeded its limit."""
 
 
 class OperationCount:

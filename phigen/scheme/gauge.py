@@ -44,9 +44,9 @@ class Gauge:
     """The Casimirs that are subtracted from H: ``free`` ones, whose multiples λ the solver chooses for each trajectory,
     and ``fixed`` ones with their multiples from the spec.
 
-    With a ``monitor`` g, they are subtracted from K = g(H + e) instead (`phigen.scheme.monitor`), and no λ is free.
-    ``omitted`` maps the name of a Casimir to the reason why ``auto`` leaves it out: the search for its λ would be too
-    long.
+    With a ``monitor`` g, the Casimirs are subtracted from K = g(H + e) in place of H, and no λ is free; see
+    `phigen.scheme.monitor`. ``omitted`` maps each Casimir that ``auto`` leaves out to the reason: the search for its λ
+    would be too long.
     """
 
     free: tuple[str, ...] = ()
@@ -69,9 +69,7 @@ class Gauge:
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
-        """The kernel argument ``gauge``, which holds the symbols that are constant on a trajectory. Without symbols the
-        mapping is empty.
-        """
+        """Map from the name "gauge" of a kernel argument to the `symbols` of the gauge; {} if there are no symbols."""
         return {"gauge": self.symbols} if self.symbols else {}
 
     @property

@@ -194,8 +194,8 @@ def build_gauss(
 def _lifted(points: StageMap, coefficients: Coefficients) -> tuple[Kernel, Kernel, Lift] | None:
     """Return the kernels of steps in moving frames: the vector field, the change of the coordinates, and the frames.
 
-    A frame is a quaternion F with y = F* k F, where y are three linear functions of the coordinates. The group element
-    of a step then starts at F instead of 1. Returns None if the group elements have no such frames.
+    The group element of a step then starts at a quaternion F, the frame, instead of 1; `phigen.gauss.lift` defines
+    frames. Returns None if the group elements have no frames.
     """
     realisation = points.realisation.lifted
     if realisation is None:

@@ -98,8 +98,8 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     """Return the kernel of the vectors y that determine the frames at the start of a step.
 
-    A frame is a quaternion F with y = F* k F. There is one frame for each copy of the quaternions in the algebra of the
-    group elements.
+    A frame is a quaternion F with y = F* k F, where k is the third imaginary unit. The algebra of the group elements
+    contains copies of the quaternions, and there is one frame for each copy.
     """
     return Kernel(
         "functionals",

@@ -53,7 +53,7 @@ class GeneratingFunction:
         """Return the function with p = ∇S_h + ``push`` in place of ∇S_h, and with the derivatives of p in place of the
         Hessian.
 
-        The covector field ``push`` is no gradient in general, so the matrix is not symmetric.
+        The covector field ``push`` is no gradient in general. The matrix in place of the Hessian is then not symmetric.
         """
         columns = [derivatives(push, c) for c in coordinates]
         slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
@@ -122,7 +122,8 @@ def graph_form(
 ) -> GeneratingFunction:
     """Return the gradient and the Hessian of S_h as graphs with shared sub-expressions.
 
-    One reverse sweep over the graph of S_h gives the gradient, and one further sweep gives each row of the Hessian.
+    One reverse sweep over the graph of S_h gives the gradient. For each component of the gradient, a reverse sweep over
+    the graph of this component gives a row of the Hessian.
     ``inputs`` are symbols that change from step to step, such as the time. Raises `OverflowError` as soon as the
     derivatives have more operations than one kernel may have.
     """

@@ -267,7 +267,7 @@ def step_inputs(system: System) -> dict[str, tuple[str, ...]]:
 
 
 def noise_fields(system: System) -> Kernel:
-    """Return the kernel of the vector fields σ π∇g of all sources of noise, one after the other."""
+    """Return the kernel of the vector fields σ π∇g, one for each source of noise with Hamiltonian g and amplitude σ."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
     purpose = "for each source of noise with the amplitude sigma and Hamiltonian g: the vector field sigma pi grad g"

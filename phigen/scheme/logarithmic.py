@@ -80,8 +80,8 @@ def fact_of(negative: str) -> str:
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
     """Return the monitor ``log`` of a splitting, or None if the spec has no monitor.
 
-    Raises `SpecError` for options that exclude the monitor, and unless H is the sum of two parts. One of the parts must
-    be negative, at least where runs start.
+    Raises `SpecError` for options that exclude the monitor, if H is not the sum of two parts, or if no part is known to
+    be negative where runs start.
     """
     if spec.monitor is None:
         return None
@@ -121,10 +121,10 @@ def composition_of(requested: str, order: int) -> str:
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether the expression ``e``, a part of H, is negative.
+    """Whether the expression ``e``, a part of H, counts as negative.
 
-    The expression is negative if its form proves this, or else if its values at the starts of all runs are negative. If
-    the spec has no runs, it also counts as negative if its form proves that it is never positive.
+    There are three cases: the form of the expression proves e < 0; the form proves e ≤ 0, and the spec has no runs; or
+    the values of e at the starts of all runs are negative.
     """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):

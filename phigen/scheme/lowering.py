@@ -67,8 +67,8 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """Return base^(1/degree) as square roots and at most one cube root; other powers of the base can share
-    them.
+    """Return base^(1/degree) as an expression with square roots and at most one cube root. Other powers of the base can
+    share the roots.
 
     Returns None if ``degree`` is not 2^n or 3·2^n.
     """

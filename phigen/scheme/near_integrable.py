@@ -85,16 +85,15 @@ class NearIntegrable(Alternation):
 class Corrected(NearIntegrable):
     """A method with a symplectic corrector for H = A + εB: each step is one flow of εB and one flow of A.
 
-    ``corrector`` has the durations of the flows at the end of a run; the inverse flows come at its start. In the steps,
-    but not in the corrector, the product of ``multiple`` and h²{B, {B, A}} is added to B.
+    ``corrector`` has the durations of the flows at the end of a run. A run starts with the inverses of these flows. In
+    the steps, but not in the corrector, the product of ``multiple`` and h²{B, {B, A}} is added to B.
     """
 
     corrector: tuple[Fraction, ...] = ()
     multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, and those at the start and the end of a run; for H = A + εB, part 0 is B and part
-        1 is A."""
+        """Return the flows of a step, and the flows at the start and the end of a run. Part 0 is B, part 1 is A."""
         flows = schedule(self.corrector)
         if not self.multiple:
             return flows

@@ -127,8 +127,7 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
-    """Return the recurrences of the path ṁ = f, where ``flow`` are the components of f in terms of m and of
-    constants."""
+    """Return the recurrences of the path ṁ = f. ``flow`` has the components of f, which contain m and constants."""
     return _PathBuilder(coordinates).path(_chains(flow))
 
 

@@ -133,8 +133,8 @@ class PredictorPolicy(Policy):
 
 @dataclass(frozen=True)
 class PlausibilityPolicy(Policy):
-    """Criteria that reject spurious solutions of an implicit step: solutions far from the state, with another
-    energy.
+    """Criteria that reject spurious solutions of an implicit step. A spurious solution is far from the state, and has
+    another energy.
     """
 
     plausible: float = number(1.5, "accepted length of a step, relative to |x| + |h dx/dt|")

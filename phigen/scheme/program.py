@@ -163,7 +163,7 @@ class Attitude:
     def lengthened(self) -> bool:
         """Whether the quaternion of a step must be normalised.
 
-        This is necessary in splittings, where the elements of flows may have any length.
+        This is necessary in splittings, since the quaternions of flows may have any norm.
         """
         return bool(self.turns) and self.quaternion
 

@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. On lattices, an input has the same name. It has
-#: the fields after the flow that the flow updates and that no other input has.
+#: Name of an output of a transposed flow: the state before the flow. On lattices, an input has this name too. It has
+#: values after the flow: those of the updated fields that no other input has.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
@@ -33,8 +33,7 @@ Form = Mapping[str, int]
 
 
 def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
-    """Return for each coefficient of a flow whether it is odd or even, or neither, as a function of the duration of the
-    flow."""
+    """Return the parity of each coefficient, as a function of the duration of a flow: `ODD`, `EVEN` or `NEITHER`."""
     parities = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
     if step.refresh:
         slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(parities)}
@@ -43,7 +42,7 @@ def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
 
 
 def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
-    """Return the values with the time h replaced by −h; ``parities`` says which symbols are odd or even in h."""
+    """Return the values with the time h replaced by −h; ``parities`` has the parities of symbols in h."""
     return [reversed_value for _, reversed_value in _parities(values, parities)]
 
 
@@ -108,7 +107,7 @@ def _stays(form: Form, changes: Mapping[str, Expression]) -> bool:
 
 
 def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> list[tuple[int, Expression]]:
-    """Return for each value its parity, as a function of the duration h of a flow, and the value with −h in place of h.
+    """Return a pair for each value: its parity in h, the duration of a flow, and the value with −h in place of h.
 
     ``of_symbols`` has the parities of symbols; symbols that are not listed are even.
     """

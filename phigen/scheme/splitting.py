@@ -210,7 +210,7 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
     """Raise `SpecError` if a monitor makes the duration of a flow depend on the state although the flow uses a matrix
     exponential.
 
-    Such exponentials are computed before the steps, for fixed durations.
+    The matrix exponentials of flows are computed before the steps, for fixed durations.
     """
     for flow in flows if monitor else ():
         if flow.exponentials:

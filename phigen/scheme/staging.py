@@ -58,7 +58,7 @@ class Coefficients:
 
     @property
     def everything(self) -> list[Expression]:
-        """The expressions of all coefficients, for tests of what they depend on.
+        """The expressions of all coefficients, to find the symbols on which a coefficient depends.
 
         An entry of exp(tA) − 1 is represented by the sum of all entries of tA.
         """

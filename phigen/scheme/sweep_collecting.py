@@ -77,8 +77,8 @@ def _from_receiver(
 ) -> Expression | None:
     """Return a contribution to the site at ``offset``, written in the symbols of that site.
 
-    ``value`` is the same contribution in the symbols of the site that it comes from. Returns None if it needs a value
-    for which the sweep has no symbol.
+    ``value`` is the contribution in the symbols of the site that it comes from. Returns None if the contribution
+    needs a value for which the sweep has no symbol.
     """
     renamed: dict[str, Expression] = {}
     for s in symbols_of(value):

@@ -37,16 +37,16 @@ def band(step: Sweeps) -> int:
 
 
 def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep is restricted by boundary seams: it omits the sites near seams, or updates only these."""
+    """Whether a sweep is restricted by boundary seams: it omits the sites near seams, or updates no others."""
     return sweep.inside or sweep.window is not None
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the code of the sites of colour 0 that a sweep updates, if it updates sites near certain boundary seams
-    only. Returns None for other sweeps.
+    """Return the code of the sites that a sweep updates, for the colour 0. Returns None unless the sweep updates only
+    sites near certain boundary seams.
 
-    The runtime marks each site near seams with a code. The code is m·c + k, where m is the bit mask of these seams, c
-    the number of colours, and k the colour of the site.
+    Each site near seams has a code in the runtime. The code is m·c + k, where m is the bit mask of the seams, c the
+    number of colours, and k the colour of the site.
     """
     return None if sweep.window is None else sweep.window * sites.colours
 
@@ -129,7 +129,8 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 def ways(step: Sweeps) -> list[tuple[int, int]]:
     """Return for each flow of a step the pair (part of this flow, part of the next flow).
 
-    The last flow of a step is merged with the first flow of the next step. The last pair belongs to this merged flow.
+    The last flow of a step is merged with the first flow of the next step. An additional last pair belongs to the
+    merged flow.
     """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
