@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: A power of two is printed as a power if its exponent is smaller than this. Such numbers are bounds on rounding
-#: errors.
+#: A power of two is printed as a power if its exponent is smaller than this number. The powers that are printed in this
+#: way are bounds on rounding errors.
 _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """Return the policies of a program. The key of a policy is the name of the runtime file that contains its
-    constants.
+    """Return the policies of a program, by the name of the runtime file with their constants.
 
     If coordinates keep their signs during a step, errors are measured relative to each coordinate.
     """
@@ -29,8 +28,8 @@ def policies_of(program: Program) -> dict[str, Policy]:
 class PolicySpelling:
     """The way a language declares the constants of policies.
 
-    ``power`` is the format of a power of two with a negative exponent, and ``written`` declares constants. ``rounded``
-    prints real numbers if the solver has another precision than double.
+    ``power`` is the format of a power of two with a negative exponent. ``written`` returns the text that declares
+    constants. ``rounded`` prints real numbers for solvers whose precision is not double.
     """
 
     power: str

@@ -88,7 +88,8 @@ def turns(*, single: bool) -> dict[str, object]:
     """Return constants for subtracting multiples of π from w = √s/2: 1/π, and an upper and a lower part of π.
 
     The sum of the two parts is π. The upper part has 33 bits, so its products with integers up to 2^20 are exact. In
-    single precision it has 8 bits, for integers up to 2^16. For s up to ``limit``, no larger integer is needed.
+    single precision, the upper part has 8 bits, and the integers go up to 2^16. For s up to ``limit``, no larger
+    integer is needed.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)
     upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
@@ -184,8 +185,8 @@ def _described(place: int) -> str:
 
 
 #: Integrals of elliptic functions, computed by Carlson's integrals. Each entry has four texts: the comment, the
-#: template of Carlson's integral, the arguments of Carlson's integral for an integral up to t, and the arguments for an
-#: integral over half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P;
+#: template of Carlson's integral, and its arguments in two cases. The first case is the integral up to t, the second
+#: the integral over half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P;
 #: `phigen.symbolic.elliptic` defines S, P and R.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),

@@ -15,8 +15,8 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Members of the struct of a solver that belong together. A solver has them if the condition ``when`` holds for its
-    switches. The condition "" always holds.
+    """Members of the struct of a solver that belong together. ``when`` is a condition on the switches of a solver: if
+    it holds, the solver has the members. The condition "" always holds.
 
     ``members`` are declarations in C, with comments for users. ``saved`` are the members that are restored if a step
     fails. They are pairs: the name, and the length of an array or "" for a number. ``reset`` are statements for a new

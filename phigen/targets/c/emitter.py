@@ -35,10 +35,10 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Cost model of blocks, in which several steps are solved together. An iteration of a block evaluates each of its steps
-#: once. For each step, it costs 1/PASSES of the evaluation of a single step if the block is vectorised. The cost is
-#: 1/PASSES_OF_CALLS for blocks that call library functions, since these blocks are not vectorised, and for blocks of
-#: steps along paths, since these blocks also compute derivatives.
+#: Cost model of blocks, in which several steps are solved together. An iteration of a vectorised block takes, for each
+#: step in the block, 1/PASSES of the time in which one step alone is evaluated. The share is 1/PASSES_OF_CALLS for two
+#: kinds of blocks: blocks that call library functions, since they are not vectorised, and blocks of steps along paths,
+#: since they also compute derivatives.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.

@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: The files with their conditions on switches (`phigen.targets.c.features`). A solver has a file if its condition
+#: The files, each with its condition on switches (`phigen.targets.c.features`). A solver has a file if the condition
 #: holds.
 CONDITIONS = {
     **{f"{kind}.c": kind.upper() for kind in _KINDS},

@@ -56,7 +56,7 @@ def _lattice(program: Program, step: Sweeps) -> str:
 
 
 def _system_of_coordinates(program: Program) -> str:
-    """Return the text of the module of an ordinary system, without its header."""
+    """Return the text of the module of a system that is no lattice, without its header."""
     choice = {"GAUGE_CHOSEN": bool(program.gauge), "GAUGE_SEARCHED": program.searches_gauge}
     features = switches(program) | choice
     modules = chosen(MODULES, features)
@@ -78,7 +78,7 @@ def _functions(program: Program) -> list[str]:
 
 
 def _model(program: Program) -> str:
-    """Return the text of the constants and kernels of an ordinary system."""
+    """Return the text of the constants and kernels of a system that is no lattice."""
     step = program.step
     text = STEP_MODULES[step.kind.name]
     pieces = [render("js", "system.mjs", _system(program))]

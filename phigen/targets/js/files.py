@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Modules for ordinary systems, in the order in which they are printed, each with its condition on switches.
+#: Modules for systems that are no lattices, in the order of printing, each with its condition on switches.
 MODULES = {
     "errors": "",
     "march": "",

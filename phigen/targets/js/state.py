@@ -29,8 +29,8 @@ class Option:
 
 @dataclass(frozen=True)
 class StateFields:
-    """Fields of a solver that belong together. A solver has them if the condition ``when`` holds for its switches. The
-    condition "" always holds.
+    """Fields of a solver that belong together. ``when`` is a condition on the switches of a solver: if it holds, the
+    solver has the fields. The condition "" always holds.
 
     ``fields`` are lines of the class. ``saved`` are the names of the fields that are restored if a step fails.
     ``options`` are options of the constructor. ``arguments`` are lines of JSDoc that describe additional arguments of a
@@ -44,7 +44,7 @@ class StateFields:
     arguments: tuple[str, ...] = ()
 
 
-#: Blocks of ordinary systems, in the order of the fields of the class.
+#: Blocks of systems that are no lattices, in the order of the fields of the class.
 SOLVER = (
     StateFields(
         options=(

@@ -34,8 +34,8 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """Return the constants for solving an implicit step, and the constants of a path. The latter are 0 if the step has
-    no path.
+    """Return the constants for solving an implicit step, among them the numbers of series of a path. If the step has no
+    path, these numbers are 0.
     """
     path, varied = step.path, step.varied_path
     return [

@@ -61,8 +61,8 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Return several products of group elements by name: for each product, its two factors in the order of the
-    multiplication.
+    """Return the factors of several products of group elements, by the name of the product. The two factors are in the
+    order of the multiplication.
 
     If momenta are in space coordinates (``spatial``), later factors are on the left.
     """

@@ -91,8 +91,8 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """Return the transposed kernel ``prepare`` with two results. The second result is the cotangent of the energy level
-    e, or an empty list if the program has no energy level.
+    """Return ``prepare``, a transposed kernel, with exactly two outputs. The second output is the cotangent of the
+    energy level e, or an empty list if the program has no energy level.
     """
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 

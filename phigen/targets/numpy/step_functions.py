@@ -24,8 +24,7 @@ from phigen.targets.rendering import render
 class _PathOverMembers(PathLayout):
     """The names of the arrays that hold the values of a path, for several members at once.
 
-    An array has the values of one quantity for all members. A Taylor series is a list of such arrays, one for each
-    order.
+    An array has the values of one quantity for all members. A Taylor series is a list with one array for each order.
     """
 
     def covector(self, i: int) -> ir.Value:

@@ -376,8 +376,8 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """Return the names of the fields and parameters that transposed kernels read. The kernels read their values before
-    the sweep.
+    """Return the names of the fields and parameters that transposed kernels read. The kernels read the values
+    before the sweep.
     """
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}

@@ -31,8 +31,8 @@ MOST_REMEMBERED = 14
 
 @dataclass(frozen=True)
 class Layout(RowLayout):
-    """The layout of the rows of a lattice in memory. ``halo`` is the number of sites that are copied beyond each end of
-    a row.
+    """The layout of the rows of a lattice in memory. ``halo`` is the number of copied sites that are stored beyond each
+    end of a row.
     """
 
     halo: int = 0

@@ -161,11 +161,8 @@ class RowLoops:
             yield over or row_loops.over_pairs(one, self.layout)
 
     def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
-        """Return the additional arguments of a loop over bonds; () if it has none. In other profiles than ``fast``, a
-        loop has these arguments if several parts of H share it.
-
-        The arguments may be three: the arrays of parameters at bonds; the direction of a bond at the site where it
-        begins, 1 or −1; and a flag that is set if the sites of the chosen colour are at the opposite ends of bonds.
+        """Return the additional arguments of a loop over bonds; () if it has none. By these arguments several parts of
+        H share a loop, in profiles other than ``fast``. `BondLoop` explains the arguments.
         """
         if self.fast or self.layout.step.adjoint or not self.layout.graph:
             return ()
