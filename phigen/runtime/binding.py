@@ -1,4 +1,4 @@
-"""Declaration of the functions of a shared library for ctypes, with the types of their arguments and results."""
+"""Declaration for ctypes of the functions in a shared library: the types of their arguments and results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Types of the arguments and results of the functions of a generated C solver, for ctypes."""
+"""Declaration for ctypes of the functions in a generated C solver: the types of their arguments and results."""
 
 from __future__ import annotations
 

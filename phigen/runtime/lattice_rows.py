@@ -153,5 +153,5 @@ class IntegrationPlan:
 
     @property
     def steps(self) -> int:
-        """Number of whole steps up to the end, including the steps of an earlier run that this one continues."""
+        """Number of whole steps up to the end. If an earlier run is continued, its steps are counted too."""
         return self.rows.steps + (self.past.steps if self.past else 0)

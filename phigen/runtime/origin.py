@@ -51,7 +51,8 @@ class Origin:
         return f"the {self._kind} {self.run} of {self.spec}"
 
     def difference(self, requested: Origin) -> str:
-        """Return how a file of the origin ``requested`` differs from this origin; "" if both origins are equal.
+        """Return a text about the first difference between this origin and the origin ``requested``; "" if they are
+        equal.
 
         The text is the end of a sentence that begins with "the file holds".
         """

@@ -1,4 +1,4 @@
-"""Poincaré sections of specs: conversion of the expression of a section to a function of arrays of states."""
+"""Poincaré sections of specs: conversion of expressions to functions, whose arguments are arrays of states."""
 
 from __future__ import annotations
 

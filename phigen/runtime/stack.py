@@ -38,8 +38,7 @@ class CallGraph:
     kinds: Mapping[str, str]
 
     def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
-        """Return the largest stack, in bytes, that a call of ``function`` needs, including the functions that
-        it calls.
+        """Return the largest stack, in bytes, that ``function`` and the functions called by it need together.
 
         Library functions are not counted. ``above`` are the functions whose calls led to this call. Raises
         `ToolchainError` if a function can call itself.
@@ -76,7 +75,7 @@ def stack_bound(files: Mapping[str, str], name: str, flags: str) -> StackBound:
 
 
 def call_graph(files: Mapping[str, str], name: str, flags: Sequence[str]) -> CallGraph:
-    """Return the call graph of the C of a solver, compiled with these flags."""
+    """Compile the C of a solver with these flags, and return its call graph."""
     with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
         folder = Path(scratch)
         for file, text in files.items():

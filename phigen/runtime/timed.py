@@ -81,7 +81,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
 def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
     """Return the number of whole steps of size h that fit into the time ``span``, and the remaining time.
 
-    If a step within the span fails, the number includes this step, so that the caller meets the same failure.
+    If a step within the span fails, the number includes this step. So the step fails again when the caller makes it.
     """
     if not np.isfinite(session.time()):
         whole_count = whole_steps(h, span)

@@ -105,8 +105,8 @@ class Trajectory:
         row.
 
         States are not interpolated: a shorter last step ends at the given time, so the Casimirs keep their values. With
-        noise, the times must be times of rows. Raises `ValueError` for other times and for times outside of the range
-        of t, and `StepError` if a step fails.
+        noise, each of the times must be the time of a row; otherwise each must be in the range of t. Raises
+        `ValueError` if a time is not possible, and `StepError` if a step fails.
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")
