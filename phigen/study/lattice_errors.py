@@ -21,8 +21,8 @@ from phigen.symbolic.expression import Expression
 #: Names of the quantities that are reported for the energy. ENERGY: the energy, if it is conserved. BALANCE: otherwise
 #: the energy minus the work done. CHANGE: the change of the energy, if the work is not computed.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
-#: Largest product of the numbers of steps and sites of a run for which the work is computed. The computation takes
-#: long, since it repeats the run step by step.
+#: Largest product steps × sites of a run for which the work is computed. The computation takes long, since it repeats
+#: the run step by step.
 MAX_BALANCED_SITE_STEPS = 20_000_000
 
 

@@ -30,8 +30,8 @@ from phigen.study.methods import size_of
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification, order_limit
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Largest product of the numbers of steps and sites of a run, without and with ``quick``. Longer runs are shortened.
-#: FRAMES is the number of states of the run at which conserved quantities are evaluated.
+#: Largest product steps × sites of a run: without ``quick`` (MOST_UPDATES), and with it (FEW_UPDATES). Longer runs are
+#: shortened. FRAMES is the number of states of the run at which conserved quantities are evaluated.
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
@@ -322,11 +322,11 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
 
 
 def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield two checks on a lattice of a few sites: of the Poisson identity DΦ π DΦᵀ = π∘Φ, and of the tangent maps DΦ.
+    """Yield two checks on a lattice of a few sites: of the identity DΦ π DΦᵀ = π∘Φ, and of the tangent maps DΦ.
 
     Each target computes its own DΦ. The error of the identity is the largest entry of DΦ π DΦᵀ − π∘Φ, divided by the
-    largest entry of |DΦ| |π| |DΦ|ᵀ. For this, each field is measured in units of its typical magnitude. Tangent maps
-    are compared with finite differences. If forces act, a step is no Poisson map, and the identity is not checked.
+    largest entry of |DΦ| |π| |DΦ|ᵀ. Each coordinate is measured in units of its typical magnitude. Tangent maps are
+    compared with finite differences. If forces act, a step is no Poisson map, and the identity is not checked.
     """
     interface, sizes = subject.solver.interface, _few_sizes(subject)
     expansion, site_count = expand(cell, sizes, ring(sizes[0]) if interface.graph else ()), int(np.prod(sizes))
@@ -424,7 +424,8 @@ class _SmallLattice:
         return image, columns.reshape(count, count).T
 
     def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
-        """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ of size h, relative to the terms in it.
+        """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ of size h. The result is relative to the largest
+        entry of |DΦ| |π| |DΦ|ᵀ.
 
         ``units`` has the unit in which each number of a state is measured.
         """

@@ -17,8 +17,8 @@ from phigen.study.balance import powers, works
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: Number of parts of equal length (windows) of a run. The largest errors in the windows show whether an error drifts or
-#: oscillates.
+#: Number of windows: parts of equal length into which a run is divided. The largest errors in the windows show whether
+#: an error drifts or oscillates.
 WINDOWS = 10
 
 #: Entry for the largest error in a window without rows.

@@ -28,9 +28,10 @@ from phigen.study.summary import Drift, Summary, summarise
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: An observed order may be smaller than the stated one by at most this.
+#: Largest accepted difference by which an observed order may be smaller than the stated order.
 ORDER_SLACK = 0.3
-#: An observed strong order may be smaller than the stated one by at most this, since few paths are used.
+#: Largest accepted difference by which an observed strong order may be smaller than the stated order. Few Wiener paths
+#: are used, so observed strong orders are uncertain.
 STRONG_SLACK = 0.2
 #: Each correction of the modified Hamiltonian H̃ should raise the power of h with which the changes of H̃ decrease. The
 #: observed power may be too small by at most this fraction of the rise due to the last correction.
