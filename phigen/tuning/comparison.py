@@ -159,7 +159,8 @@ def compare(
 
 
 def _settings(problem: Problem, current: Setting, orders: Sequence[int]) -> list[Setting]:
-    """Return the settings to compare: bi-realisations, splitting and Gauss, each at all ``orders`` that it offers."""
+    """Return the settings to compare: bi-realisations, splitting and Gauss, each at those of the ``orders`` that it
+    offers."""
     families = dict.fromkeys([current.family, *(guess.family for guess in problem.guesses(current))])
     return [replace(family, order=order) for family in families for order in orders if order in family.orders]
 

@@ -145,7 +145,7 @@ class LatticeProblem(Problem):
         return Candidate(flat, self)
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """Return the settings to measure first: that of the spec at orders 2 and 4, splittings, and the series.
+        """Return the settings to measure first: the setting of the spec at orders 2 and 4, splittings, and series.
 
         The series is tried with each bi-realisation that might apply to the brackets of a site.
         """
@@ -177,7 +177,8 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """Return the tuning problem of a run of a lattice; ``settings`` are parameters that replace those of the run.
+    """Return the tuning problem of a run of a lattice; ``settings`` are values that replace values of parameters of the
+    run.
 
     ``step`` and ``span`` are the step size and the duration of the run, both positive; ``direction`` is 1 or −1. A run
     on a large grid is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.

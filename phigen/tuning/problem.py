@@ -138,7 +138,7 @@ class SystemProblem(Problem):
     def casimir_error(self, states: Floats) -> float | None:
         """Return the largest error of a Casimir along a run with states (rows, DIM); None if there are no Casimirs.
 
-        The error is relative to the initial value, or to its terms if these nearly cancel.
+        The error is relative to the initial value or, if the terms of this value nearly cancel, to the terms.
         """
         system, casimirs = self.system, self.system.casimirs
         if not casimirs:
@@ -175,7 +175,7 @@ class CompiledMethod(Protocol):
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function for timing. A call of it with a number n makes n further steps of size ``h``.
+        """Return a function of a number n that makes n further steps of size ``h``, for timing.
 
         The first call starts from the initial state.
         """

@@ -14,8 +14,9 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: The time span of the search is the time of some steps of the run, made by the method of the spec. PIECE_SECONDS:
-#: processor time of these steps, in seconds. PIECE_STEPS: largest number of these steps; the least number is 500.
+#: The search measures methods over the time span of a number of steps of the run. PIECE_SECONDS: processor time that
+#: the method of the spec takes for these steps, in seconds. PIECE_STEPS: largest number of these steps; the least
+#: number is 500.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.
@@ -56,7 +57,7 @@ def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -
 
 
 def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
-    """Return the largest absolute value of an eigenvalue of the derivative of a vector field at several states.
+    """Return the largest |λ| at several states, where λ are the eigenvalues of the derivative of a vector field.
 
     ``states`` has the shape (rows, DIM). In high dimensions the result is an estimate.
     """
@@ -74,7 +75,7 @@ def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
 
 
 def _growth(field: Callable[[Floats], Floats], x: Floats, width: float) -> float:
-    """Return an estimate of the largest absolute value of an eigenvalue of the derivative at a state (DIM,).
+    """Return an estimate of the largest |λ| at a state (DIM,), where λ are the eigenvalues of the derivative.
 
     The derivative is applied repeatedly to a vector, by finite differences of size ``width``.
     """

@@ -1,4 +1,4 @@
-"""Measurement of the error of a method with one step size over a part of a run, and extrapolation to the whole run."""
+"""Errors of methods with one step size: measured over a part of a run, and extrapolated to the whole run."""
 
 from __future__ import annotations
 
