@@ -147,7 +147,7 @@ def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fracti
 
 
 def _numbers(sequence: Any, what: str) -> list[float]:
-    """Return a number or an array as a list of finite numbers. Error messages use the name ``what`` for it."""
+    """Return a number or an array as a list of finite numbers. ``what`` is its name in messages."""
     return arguments.array(sequence, what, (len(sequence),) if np.ndim(sequence) else (1,)).tolist()  # type: ignore[no-any-return]
 
 

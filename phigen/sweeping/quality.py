@@ -24,7 +24,7 @@ class EnergyErrors:
 
 
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
-    """Return the number of members of a sweep whose stored energy error exceeds ``limit``, and the largest error.
+    """Return the number of members whose stored energy error exceeds ``limit``, and the largest error.
 
     Errors are relative to the initial energy. If the terms of H nearly cancel at the start, errors are relative to the
     sum of the absolute values of the terms. Members that failed or are not computed yet are not counted. If time,
@@ -40,7 +40,7 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 
 
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
-    """Return the number of members of a sweep of a lattice whose energy error exceeds ``limit``, and the largest error.
+    """Return, for a lattice, the number of members whose energy error exceeds ``limit``, and the largest error.
 
     Errors are relative to the initial energy, or to the sum of |energy of a site| if the energies of the sites nearly
     cancel. The store does not contain the initial energies, so they are computed again.
