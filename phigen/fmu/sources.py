@@ -37,7 +37,7 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
-    """Return a hash of the files of the solver and of the first run of the spec.
+    """Return a hash of the generated files and of the first run of the spec.
 
     ``modelDescription.xml`` and the compiled library both contain the hash. The library starts only if the two hashes
     are equal.
