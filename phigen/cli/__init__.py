@@ -80,7 +80,7 @@ class Commands(click.Group):
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         if isinstance(sys.stdout, TextIOWrapper):
-            # By default, printing a character that the terminal cannot show raises an exception. Here such a character
+            # By default, printing a character that the terminal cannot show raises an exception. Here the character
             # is written as an escape, as Python does on stderr.
             sys.stdout.reconfigure(errors="backslashreplace")
         try:

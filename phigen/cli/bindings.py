@@ -20,7 +20,7 @@ LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return the ``planned`` changes with further changes: the bindings of each system, and the C that they call.
+    """Return the ``planned`` changes with further changes: for each system, its bindings and the C that they call.
 
     Raises `SpecError` with a list of the systems for which bindings cannot be generated.
     """

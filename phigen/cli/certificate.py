@@ -24,10 +24,10 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """Return the part of a certificate that identifies the build for which it is valid.
+    """Return the entries of a certificate that identify a build.
 
-    This part has the version of phigen, the name of the system, the hash of the spec, and a checksum for each file. The
-    checksum is that of the text below the header of the file.
+    The entries are the version of phigen, the name of the system, the hash of the spec, and a checksum for each file.
+    The checksum covers the text below the header of the file.
     """
     return {
         "phigen": __version__,

@@ -34,8 +34,8 @@ def command(console: Console, target: str) -> None:
     """Compile the paper's Lotka–Volterra system, run it until shortly before the singularity of the solution, and print
     the errors of the solvers.
 
-    The solution has a closed form and becomes infinite in finite time. The table compares two solvers of phigen with
-    RK2, with the same step. It lists their distances from the closed form, and their errors of the Casimir.
+    The solution has a closed form and becomes infinite in finite time. The table compares two solvers of phigen and
+    RK2, all with one step size. It lists the distances from the closed form, and the errors of the Casimir.
     """
     import numpy as np
 

@@ -29,7 +29,7 @@ def ended(experiment: E, solver: AnySolver, console: Console) -> E:
     """Return the experiment with its end, if the run has the key ``until`` or ``stop``.
 
     ``until`` is a time. ``stop`` is an expression, and the run ends at the first zero of this expression. The field
-    ``end`` and the number of steps are set. Runs without these keys are returned unchanged.
+    ``end`` and the number of steps are set. Without these keys, the experiment is returned unchanged.
     """
     run, h = experiment.run, experiment.h
     end: End | None = None

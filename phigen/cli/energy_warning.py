@@ -33,8 +33,8 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
     """Return the warning about the energy error of a run without a lattice; "" if no warning is necessary.
 
     If forces act or H depends on the time, the energy error is the change of H minus the work done. The work is an
-    integral, whose error is estimated. There is no warning if this estimate is larger than half the energy error, or
-    exceeds the limit for energy errors.
+    integral, whose error is estimated. A finite energy error gives no warning if the estimate is larger than half the
+    energy error, or larger than `LARGE_ENERGY_ERROR`.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < min(energy.error / 2, LARGE_ENERGY_ERROR)

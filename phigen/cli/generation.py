@@ -173,8 +173,8 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
-        # The profile would leave out the function that sets parameters, but bindings need it. So the command names the
-        # bindings.
+        # The profile leaves out the function that sets parameters. With the option --binding, the C has this function,
+        # so the command must contain the option.
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     expect_target(compilation, target)
@@ -183,8 +183,9 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
 
 
 def expect_target(compilation: Compilation, target: str) -> None:
-    """Raise `SpecError` if the target cannot express the program. The error has the place of the key ``targets``, if
-    the spec names the target there.
+    """Raise `SpecError` if the target cannot express the program.
+
+    If ``targets`` of the spec contains the target, the error has the place of this key.
     """
     spec = compilation.spec
     try:

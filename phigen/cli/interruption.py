@@ -31,7 +31,7 @@ def interruptible() -> Iterator[Stop]:
     """Context in which SIGINT and SIGTERM set the flag of a `Stop`; a second signal raises `KeyboardInterrupt`."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
-        yield stop  # Python passes signals to the main thread only
+        yield stop  # Python handles signals in the main thread only, so no handler is installed here
         return
 
     def handle(number: int, frame: FrameType | None) -> None:

@@ -131,7 +131,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
     # With a monitor, steps are not equal in t, so the times do not determine the number of steps. A .npz file contains
-    # the number. For a .csv file, the number is 0.
+    # this number. A .csv file does not, and ``earlier_run.steps`` is then 0.
     steps = earlier_run.steps if solver.interface.monitored else steps
     return replace(experiment, past=replace(earlier_run, steps=steps))
 

@@ -44,5 +44,5 @@ def names_left_out(directory: Path) -> dict[str, Location]:
 
 
 def unknown_names(places_by_name: Mapping[str, Location], specs: Collection[str]) -> list[str]:
-    """Return a message for each name in the list that is not the name of a spec."""
+    """Return a message for each name in ``left_out.txt`` that is not the name of a spec."""
     return [f"{place}: no spec has the name {name}" for name, place in places_by_name.items() if name not in specs]

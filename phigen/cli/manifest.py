@@ -103,7 +103,7 @@ def text_of(entries: Mapping[str, ManifestEntry], builds: Collection[str] = ()) 
 
 
 def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
-    """Return the entries of a folder's manifest by name, and its build systems.
+    """Return what the manifest of a folder lists: the entries by name, and the build systems.
 
     Without a manifest there are no entries and no build systems. Raises `CheckError` if the manifest is damaged.
     """

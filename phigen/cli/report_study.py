@@ -25,7 +25,7 @@ _PROCESSOR = Path("/proc/cpuinfo")
 def studied(
     compilation: Compilation, experiment: Experiment, quick: bool, console: Console
 ) -> tuple[Study | None, str]:
-    """Return the study of precision and time, and "". If there is no study, return None and the reason."""
+    """Return a pair: the study of precision and time, and "". Without a study the pair is None and the reason."""
     import numpy as np
 
     from phigen.api import solver_of

@@ -119,7 +119,7 @@ def print_averages(names: Sequence[str], averages: Averages, observables: Sequen
 def _time_shown(average: Average) -> str:
     """Return the correlation time of an average as text.
 
-    If blocks of rows are too short for an estimate, the number is only a lower bound, and begins with ">".
+    If blocks of rows are too short for an estimate, the number is only a lower bound. Then the text begins with ">".
     """
     return "> " * (not average.resolved and math.isfinite(average.error)) + f"{average.correlation_time:.2g}"
 

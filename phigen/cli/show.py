@@ -166,7 +166,8 @@ def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
 def _forces(system: System, max_terms: int | None) -> list[tuple[str, str]]:
     """Return the forces of ẋ = π(∇H + ζ) + f as pairs of name and text.
 
-    The pairs are the components of ζ and f in the spec, and the damping coefficient λ, which adds λ π∇H to ζ.
+    There is a pair for each component of ζ and f in the spec. With damping, which adds λ π∇H to ζ, a pair for λ
+    follows.
     """
     from phigen.spec.model import SpecForces
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 #: Further accuracies for which results are shown, as multiples of the requested accuracy.
 _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
-#: A remark says that larger steps fail, if the error of the cheapest setting is smaller than the requested accuracy by
-#: more than this factor, although no larger step was possible.
+#: A remark says that larger steps fail. It appears if the requested accuracy is more than this number times the error
+#: of the cheapest setting, and the step of this setting is nearly the largest one that was possible.
 _UNDECIDED_FACTOR = 20
 #: _MOST_MONITORS: largest number of monitors in the table. _LEAST_GAIN: a monitor is proposed only if it reduces the
 #: number of steps by this factor, since each step with a monitor costs more. _FORMULA_LENGTH: number of characters to

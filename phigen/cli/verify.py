@@ -66,10 +66,11 @@ def command(
 ) -> None:
     """Build every target of specs, and measure whether the solvers have the promised properties.
 
-    The command measures the observed order, the errors of Casimirs and energy, the Poisson identity with the exact
-    tangent map, reversibility, agreement of the targets, and the largest step with which the solver converges. It also
-    measures the drift of errors: the largest error in the last tenth of the run, divided by that in the first tenth.
-    Classical methods are measured for comparison. Exit code 5 if a measurement misses its bound.
+    The command measures the observed order, the errors of Casimirs and energy, reversibility, agreement of the targets,
+    and the largest step with which the solver converges. It measures the error of the Poisson identity DΦ π DΦᵀ = π∘Φ
+    for a step Φ with the exact derivative DΦ. It also measures the drift of errors: the largest error in the last tenth
+    of the run, divided by that in the first tenth. Classical methods are measured for comparison. Exit code 5 if a
+    measurement misses its bound.
     """
     from phigen.compiler import compile_proved
     from phigen.runtime.origin import origin_of
