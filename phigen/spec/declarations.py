@@ -66,9 +66,9 @@ class Declarations:
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Return the error (message, hint) for each of the ``names`` that has values at bonds only.
+        """Return those of the ``names`` that have values at bonds only, each with an error (message, hint).
 
-        The error is for formulas at a site.
+        The error is reported if a formula at a site contains the name.
         """
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
@@ -77,9 +77,9 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """Return the error (message, hint) for each name of an index or a size, such as i or N_i.
+        """Return the names of indices and sizes, such as i and N_i, each with an error (message, hint).
 
-        The error is for formulas that must be the same at all sites.
+        The error is reported if a formula that must be the same at all sites contains the name.
         """
         reason = "this expression must be the same for all sites"
         hint = "to use a value for each site, declare a parameter {value: …, at: sites}"
@@ -181,9 +181,9 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """Return the error (message, hint) for the time, and for each definition that depends on the time.
+        """Return the names of the time and of definitions that depend on it, each with an error (message, hint).
 
-        The error is for formulas that must not depend on the time.
+        The error is reported if a formula that must not depend on the time contains the name.
         """
         hint = "the time is allowed in H, forces, noise, invariants, observables, sections, stop and exact solutions"
         refused = {

@@ -48,10 +48,11 @@ class Values:
 class Parameter:
     """A parameter of the spec, which is a run-time argument of the generated code.
 
-    ``value`` is the default. If ``small``, the terms of H with this factor are a small perturbation. If
-    ``nonnegative``, the parameter is 0 or positive. ``at`` is ``all`` for one number. In lattices, ``sites`` or
-    ``bonds`` stands for an array with a value at each site or bond. If the defaults of an array are not all equal,
-    ``values`` describes them, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is converted.
+    ``value`` is the default. If ``small``, the parameter is a factor of those terms of H that are a small
+    perturbation. If ``nonnegative``, the parameter is 0 or positive. ``at`` is ``all`` for one number. In lattices,
+    ``sites`` or ``bonds`` stands for an array with a value at each site or bond. If the defaults of an array are not
+    all equal, ``values`` describes them, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is
+    converted.
     """
 
     name: str
@@ -205,8 +206,9 @@ class Extras:
     included: frozenset[str] = frozenset()
 
     def offers(self, part: str, profile: str) -> bool:
-        """Whether code with this profile includes a part of `phigen.spec.names.PARTS`. The part must also fit the
-        system.
+        """Whether these settings and the profile allow a part of `phigen.spec.names.PARTS` in the code.
+
+        Whether the part fits the system is not checked here.
         """
         return part not in self.without | (LEFT_OUT[profile] - self.included)
 

@@ -48,7 +48,7 @@ def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = M
 def _numbered(word: str, choices: Iterable[str]) -> list[str]:
     """Return the choices that differ from the word only in the number at its end, such as x1 for x5.
 
-    Those with the nearest numbers come first.
+    The choices with the nearest numbers come first.
     """
     stem = word.rstrip("0123456789")
     row = [c for c in choices if c != stem and c[len(stem) :].isdecimal()] if stem and stem != word else []

@@ -50,9 +50,9 @@ _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 # linked with the generated code would call the generated functions instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: A spec must not have a name that ends in one of these words. Each word has the ending of the symbol that would clash.
-#: For example, a spec NAME generates the symbol NAME_default_params for its default parameters. A spec NAME_default
-#: would generate the same symbol for the type of its parameters.
+#: The name of a spec must not end in an underscore and one of these words. For example, a spec NAME generates the
+#: symbol NAME_default_params for its default parameters. A spec NAME_default would generate the same symbol for the
+#: type of its parameters. The value of each word is the part of the symbol after NAME_.
 CLASHING_ENDS = {
     "default": "default_params",
     "modified": "modified_hamiltonian",

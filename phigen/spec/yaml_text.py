@@ -12,7 +12,7 @@ from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, V
 from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
-#: An expression with more characters or more nodes (numbers, names, operators) than this is divided into definitions.
+#: A sum with more than _LENGTH characters, or more than _NODES numbers, names and operators, is divided into definitions.
 #: The bounds are nine tenths of the limits for expressions, since parentheses may be added.
 _LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
