@@ -106,7 +106,7 @@ def _values(values: Mapping[str, float]) -> Markup:
 
 
 def provenance(material: Material) -> Iterator[Markup]:
-    """Return the section on provenance: the spec, the version and the command of the page."""
+    """Return the section on provenance: the version, the spec, the command, and the machine of the measurements."""
     spec = material.compilation.spec
     pairs = [
         ("phigen", material.compilation.program.version),

@@ -35,9 +35,9 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: Limits for the sizes that the panel offers: those of the run, halved and doubled several times. FEWEST: smallest
-#: number of sites along an axis. MOST_PAIRS, MOST_IN_CHAIN and MOST_SITES: largest numbers of sites in systems of
-#: pairs, in chains and in other lattices.
+#: The panel offers the sizes of the run, and smaller and larger sizes within these limits. FEWEST: smallest number of
+#: sites along an axis. MOST_PAIRS, MOST_IN_CHAIN and MOST_SITES: largest numbers of sites in systems of pairs, in
+#: chains and in other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 #: Largest total number of values in the lists that a page contains: initial values, parameters and bonds.
 MOST_NUMBERS = 20_000
