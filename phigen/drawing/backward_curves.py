@@ -1,4 +1,7 @@
-"""Plots of the error of the modified Hamiltonian: along a trajectory, and as a function of the step size."""
+"""Plots of the error of the modified Hamiltonian: along a trajectory, and as a function of the step size.
+
+The error is the change of the modified Hamiltonian since the start of the trajectory.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Figures of runs: trajectories, errors of conserved quantities, Poincaré sections, convergence, work.
 
 Each function returns a `matplotlib.figure.Figure`, and does not change matplotlib's global state. Colours are those of
-`phigen.drawing.palette.PALETTE`. The functions `save` and `svg` of that module write equal figures with equal bytes.
+`phigen.drawing.palette.PALETTE`. The functions `save` and `svg` of that module give reproducible output.
 matplotlib is an optional dependency, in the extra ``plot``; without it, every function raises `MissingPackageError`.
 """
 

@@ -82,7 +82,7 @@ _STYLE: Any = {
 }
 
 
-#: Style of a horizontal reference line: rounding, an accuracy, zero.
+#: Style of a horizontal reference line, for instance at the size of rounding errors, at an accuracy, or at 0.
 MARK: Mapping[str, Any] = {"color": PALETTE["muted"], "linewidth": 0.8, "linestyle": (0, (1, 2)), "zorder": 1}
 
 

@@ -206,8 +206,9 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 def box_of(points: Floats) -> Floats:
     """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
 
-    If the points extend much less along one axis than along the others, the box is widened along this axis. An axis
-    with values below 1/100 of the largest value is widened less.
+    Along each axis, the width of the box is at least 0.4 times the largest extent of the points. If all values on an
+    axis are below 1/100 of the largest value on any axis, the width along this axis is instead at least 1/10 of the
+    largest value on this axis.
     """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
