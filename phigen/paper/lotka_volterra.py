@@ -1,4 +1,4 @@
-"""Lotka–Volterra up to its singularity: the errors of four methods, and which of them detect the singularity."""
+"""Lotka–Volterra up to its singularity: the errors of four methods, and which methods detect the singularity."""
 
 from __future__ import annotations
 

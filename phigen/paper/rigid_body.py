@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: LONG: number of steps of the long run. EARLY: number of steps of shorter runs, in which numbers are measured too.
+#: LONG: number of steps of the long run. EARLY: number of steps of shorter runs, which are measured too.
 #: ROWS: number of rows that each run stores.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 #: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
