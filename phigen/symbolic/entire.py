@@ -129,7 +129,7 @@ def by_closed_form(library: Any, name: str, s: Any) -> Any:
 
 
 def in_double(name: str, s: float) -> float:
-    """Return the value of a function of `ENTIRE` in double precision, computed as generated code does."""
+    """Return the value of a function of `ENTIRE` in double precision, by the algorithm of generated code."""
     function = ENTIRE[name]
     if abs(s) > function.radius:
         return float(by_closed_form(math, name, s))

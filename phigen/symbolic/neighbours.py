@@ -2,8 +2,8 @@
 
 On a grid the brackets contain the nonzero steps along the axes, in the order of the axes; ``x`` without brackets is the
 value at the site itself. On lattices without axes the brackets contain an end, a or b, of a bond or a pair. The whole
-text is the name of an ordinary symbol. Names that a spec declares contain no brackets, so no declared name equals such
-a text.
+text is the name of an ordinary symbol. Names that a spec declares contain no brackets, so they differ from the texts
+with brackets.
 """
 
 from __future__ import annotations

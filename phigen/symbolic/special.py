@@ -76,7 +76,7 @@ def rest_coefficients(order: int) -> list[float]:
 
 
 def in_double(order: int, s: float) -> float:
-    """Return the derivative of φ (see `coefficient`) of this order at s in double precision, as generated code does."""
+    """Return the derivative of φ (see `coefficient`) of this order at s, by the algorithm of generated code."""
     if abs(s) < NEAR:
         return _polynomial(near_coefficients(order), s)
     if abs(s) < MIDDLE:

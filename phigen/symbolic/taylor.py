@@ -1,7 +1,7 @@
 """Truncated power series in t of an expression whose symbols are power series in t.
 
 A `Taylor` contains the series of every node of the expression. The coefficients are elements of a ring: polynomials (a
-`Tower`), or expressions (`ExpressionRing`). *Level* i consists of the coefficients of tⁱ of all nodes. Level i is
+`Tower`), or expressions (`ExpressionRing`). *Level* i has the coefficient of tⁱ of every node. Level i is
 computed before level i + 1. So the coefficient of a symbol at level i may depend on results at level i − 1, as in the
 Hamilton–Jacobi recursion.
 """

@@ -1,9 +1,10 @@
 """The differential ring in which phigen computes: polynomials over Q in symbols and in values of functions.
 
-H or π may contain functions that are not polynomial, such as ``exp(x)``, ``1/(x**2+1)`` or ``sqrt(l)``. The value of
-each of them is one more variable of the ring, a *generator*. The derivatives of generators are again elements of the
-ring. So one fast arithmetic of polynomials serves every Hamiltonian. Generators satisfy relations, such as r·f = 1 for
-r = 1/f, w² = q for w = √q, and sin² + cos² = 1. `Tower.is_zero` uses the relations to decide whether an element is 0.
+H or π may contain functions that are not polynomial, such as ``exp(x)``, ``1/(x**2+1)`` or ``sqrt(l)``. Each
+value of a function that is not polynomial is one more variable of the ring, a *generator*. The derivatives of
+generators are again elements of the ring. So one fast arithmetic of polynomials serves every Hamiltonian. Generators
+satisfy relations, such as r·f = 1 for r = 1/f, w² = q for w = √q, and sin² + cos² = 1. `Tower.is_zero` uses the
+relations to decide whether an element is 0.
 """
 
 from __future__ import annotations
