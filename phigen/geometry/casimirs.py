@@ -45,8 +45,9 @@ def found_casimirs(
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
     """Return further Casimirs, independent of the declared ones, and notes for the user.
 
-    The Casimirs have the names C1, C2, …, as far as these are unused. The search ends when there are as many Casimirs
-    as the corank of π. If it finds fewer, the notes say which parts of the search were omitted.
+    The Casimirs get the names C1, C2, …; names in ``used_names`` are skipped. The search ends when the number of
+    independent Casimirs equals the corank of π. If fewer are found, the notes say which parts of the search were
+    omitted.
     """
     slopes = [gradient(c, coordinates) for c in declared.values()]
     ranks = generic_ranks([poisson, slopes])
@@ -115,8 +116,7 @@ def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:
 
 
 def _monomial(coordinates: Sequence[str], a: Matrix) -> Iterator[Expression]:
-    """Yield Casimirs of a log-canonical π with the matrix A: x^u for each vector u of a basis of the kernel of
-    A.
+    """Yield Casimirs of a log-canonical π with the matrix A: x^u for each u in a basis of the kernel of A.
 
     If u contains parameters, the Casimir is ½ Σ u_i log x_i² instead of x^u.
     """

@@ -92,8 +92,8 @@ def force_statements(system: System) -> Iterator[Statement]:
 def noise_statements(system: System) -> Iterator[Statement]:
     """Yield the statements about noise.
 
-    The first one says whether the sources of noise commute, which decides the strong order. The second one says that
-    the density exp(−H/T) is stationary for some temperature T. If it is not proved, there is no second statement.
+    The first statement says whether the sources of noise commute, which decides the strong order. A second statement
+    says that the density exp(−H/T) is stationary for some temperature T. The second statement is yielded only if it holds.
     """
     if not system.noise:
         return
@@ -135,8 +135,7 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
     """Return a label, and an expression that is 0 if and only if the flows of the noise sources i and j
     commute.
 
-    Let g_i be the Hamiltonian of source i, and σ_i its amplitude. The expression is the sum of the squares of the
-    components of π∇{σ_i g_i, σ_j g_j}.
+    Let g_i be the Hamiltonian of source i, and σ_i its amplitude. The expression is |π∇{σ_i g_i, σ_j g_j}|².
     """
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))

@@ -20,10 +20,10 @@ _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIV
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
     """Return the statement that ``e`` is positive.
 
-    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It counts as proved if the form
-    of ``e`` shows that ``e`` is nowhere negative. If the form allows that ``e`` is 0, the detail of the statement says
-    so. Otherwise the statement is checked at the starts, or undecided if there are none. The symbols ``positive`` are
-    positive.
+    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. Otherwise it counts as proved if
+    the form of ``e`` shows that ``e`` is nowhere negative. The detail of the statement says whether ``e`` may be 0. If
+    the form decides nothing, the statement is checked at the starts, or undecided if there are none. The symbols
+    ``positive`` are positive.
     """
     for point in starts:
         try:
@@ -84,7 +84,7 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
-        if e.op == "neg":  # the sign is known if the argument is a negative number, or a product with such a factor
+        if e.op == "neg":  # the sign is known if the argument is a negative number, or a product with a negative number
             return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None

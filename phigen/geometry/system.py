@@ -187,9 +187,9 @@ class System:
 def system_from_spec(spec: Spec) -> System:
     """Return the system of a spec: the matrix π, its shape, and the Casimirs that phigen finds for it.
 
-    The only proof here is that matrices or structure constants define a Lie algebra; `phigen.geometry.checks` has the
-    others. Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants that violate the
-    Jacobi identity, and for sizes that do not match the number of coordinates.
+    No statement is proved here, except that matrices or structure constants define a Lie algebra. Raises `SpecError`
+    for matrices that do not span a Lie algebra, for structure constants that violate the Jacobi identity, and for sizes
+    that do not match the number of coordinates.
     """
     if spec.lattice:
         raise system_of_lattice(spec)

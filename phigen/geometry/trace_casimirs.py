@@ -18,9 +18,9 @@ _MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
     """Yield tr X^m for m = 1, 2, … up to the number of rows, where X = Σ x_i E^i, and tr(E^i E_j) = δ_ij.
 
-    The coefficients of the characteristic polynomial of X are polynomials in these traces. Nothing is yielded if the
-    trace form is degenerate, if a matrix contains parameters, or if the matrices are large. The sequence ends at the
-    first trace with too many terms.
+    The E_j are the matrices of the ``representation``. The coefficients of the characteristic polynomial of X are
+    polynomials in these traces. Nothing is yielded if the trace form is degenerate, if a matrix contains parameters, or
+    if the matrices are large. The sequence ends at the first trace with too many terms.
     """
     if representation.size > _LARGEST:
         return
