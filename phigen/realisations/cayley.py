@@ -156,8 +156,9 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
-    """Raise `SpecError` if a linear π violates the Jacobi identity. No matrices represent its structure
-    constants then.
+    """Raise `SpecError` if a linear π violates the Jacobi identity.
+
+    No matrices can represent the structure constants of this π.
     """
     failing = failing_jacobi(algebra)
     if failing is not None:

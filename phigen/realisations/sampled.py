@@ -36,7 +36,7 @@ def is_large(system: System, realisation: BiRealisation) -> bool:
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
-    # The result compares a rough number of products of terms in all brackets with a limit; a node counts as a term.
+    # The number of products of terms in all brackets is estimated roughly. Each node counts as a term.
     sizes = sum(len(topological([e])) for e in realisation.alpha)
     return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
 
@@ -90,7 +90,7 @@ def _failures(
     """Return three texts, for {α_i, α_j}, {β_i, β_j} and {α_i, β_j}: each names a pair whose bracket is wrong at a
     point.
 
-    The text is "" if the brackets of all pairs are right. ``slopes`` are the derivatives of α and β.
+    A text is "" if the brackets of all pairs are right. ``slopes`` are the derivatives of α and β.
     """
     n, names = system.dimension, system.coordinates
     values = iter(evaluate_exactly([e for one_map in slopes for row in one_map for e in row], point))
