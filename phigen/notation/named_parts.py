@@ -41,8 +41,8 @@ class Readable:
 def readable(expressions: Sequence[Expression]) -> Readable:
     """Return expressions in a form for display: multiplied out, unchanged, or with names for common subexpressions.
 
-    All expressions share the names. Expressions that are long in every other form contain names. All expressions
-    contain names if this makes the formulas much shorter.
+    A name has one definition, which holds in all expressions. Names are used in those expressions that are long without
+    names or, if this makes the formulas much shorter, in all expressions.
     """
     unnamed_form, named_form = _partly_named(expressions), _all_named(expressions)
     return (

@@ -21,8 +21,7 @@ _Sum = dict[str | None, Expression] | None
 
 
 def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
-    """Return a node as a linear combination of logarithms of squares of symbols; None if the node has another
-    form.
+    """Return a node as a linear combination of terms log x², where x is a symbol; None if the node has another form.
 
     ``args`` are the results for the arguments of the node.
     """

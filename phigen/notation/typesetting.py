@@ -16,11 +16,10 @@ from xml.etree.ElementTree import Element
 LINE = 31.0
 #: Indentation of continued lines in LaTeX, and its width in em.
 INDENT, INDENTED = "\\quad ", 1.0
-#: A break inside parentheses is as bad as an empty part of the line: this fraction of the line for each pair of
-#: parentheses around the break.
+#: The cost of ending a line at some place is the fraction of the line that stays empty, plus this number for each pair
+#: of parentheses around the place. The line ends where the cost is least.
 _SHORTER = 0.35
-#: A break between two factors is as bad as a break before a sign with this number of additional pairs of parentheses
-#: around it.
+#: A place between two factors has the cost of a place inside this number of additional pairs of parentheses.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
