@@ -115,16 +115,12 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=extras))
 
     def with_stack(self, stack: StackBound | None) -> Self:
-        """Return the compilation with a measured stack use. The C states it in a comment; None means that there is no
-        comment.
-        """
+        """Return the compilation with a measured stack use, which the C states in a comment; for None, without one."""
         return replace(self, program=replace(self.program, stack=stack))
 
     @property
     def method(self) -> str:
-        """The method in words: scheme, bi-realisation if there is one, order, and profile. The output of runs begins
-        with it.
-        """
+        """The method in words: scheme, bi-realisation if there is one, order, and profile."""
         scheme = self.described["scheme"]
         scheme_text = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
         return f"scheme {scheme_text}, order {self.order.order}, profile {self.program.profile}"
@@ -183,9 +179,7 @@ class _Compiled(ABC):
         return None
 
     def named(self, method: str) -> str:
-        """Return a line that names the method: the argument, followed by a reason if the runs of the spec decide the
-        method.
-        """
+        """Return ``method``, a line that names the method. Subclasses may add the reason for the method."""
         return method
 
     def by_series(self) -> CompiledSeries:
@@ -215,9 +209,9 @@ class _Compiled(ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _CompiledSystem(_Compiled, ABC):
-    """Base class of the compilations of ordinary systems, whose number of coordinates is fixed.
+    """Base class of the compilations of systems with a fixed number of coordinates.
 
-    Compilations of lattices have another class.
+    The class for lattices of any size is not derived from this class.
     """
 
     system: System
@@ -290,8 +284,8 @@ class CompiledSeries(_CompiledSystem):
     def exact(self) -> bool:
         """Whether the maps α and β are exact, rather than truncated.
 
-        Then a step maps α(y, p) to β(y, p) to round-off, where y is the solution of the implicit equation, and p a
-        covector.
+        With exact maps, the state before a step is α(y, p) and the state after it is β(y, p), up to round-off, for some
+        y and p.
         """
         return self.realisation.exact
 
@@ -438,9 +432,7 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def degree(self) -> int | None:
-        """The order d of the method. If steps do not preserve the Poisson structure exactly, the defect of a step is
-        O(h^(d+1)).
-        """
+        """The order d of the method. Unless steps preserve the Poisson structure exactly, the defect is O(h^(d+1))."""
         return self.order.order
 
     @property
@@ -556,9 +548,7 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return a line that names the method: the argument, followed by a reason if the sizes in runs decide the
-        method.
-        """
+        """Return ``method``, a line that names the method. A reason follows if the sizes in runs decide the method."""
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count

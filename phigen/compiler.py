@@ -91,9 +91,10 @@ def examine(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Examination:
-    """Compile a spec as far as possible, and prove all statements about the system and the method.
+    """Compile a spec, and prove the statements about the system and the method.
 
-    A refuted statement raises no error. Raises `SpecError` if the spec does not even define a system.
+    A refuted statement raises no error. After some refuted statements, such as the Jacobi identity, the method is not
+    compiled. Raises `SpecError` if the spec does not even define a system.
     """
     spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
@@ -135,9 +136,8 @@ def compile_proved(
 ) -> Compilation:
     """Compile a spec, as `compile_spec` does, and prove the statements about the system and the method.
 
-    Raises `CheckError` with the name and the residual of a statement if the statement is refuted. Then π is not
-    Poisson, a declared Casimir is not a Casimir, or the bi-realisation is wrong. Also raises the `SpecError` and
-    `LimitError` of `compile_spec`.
+    Raises `CheckError` if a statement is refuted, for instance if π is not Poisson, or if a declared Casimir is not a
+    Casimir. Also raises the `SpecError` and `LimitError` of `compile_spec`.
     """
     examination = examine(spec, system=system, **options)
     if examination.refuted:
@@ -179,7 +179,10 @@ def _warn_of_written_out_lattice(spec: Spec) -> None:
 
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
-    """Compile a lattice as far as possible, and prove all statements. The proofs hold for any number of sites."""
+    """Compile a lattice, and prove the statements about it, for any number of sites.
+
+    After a refuted statement, the method is not compiled.
+    """
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.proofs import lattice_statements
 

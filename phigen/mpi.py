@@ -251,7 +251,7 @@ class _Domain:
         return first, end
 
     def _neighbours(self) -> list[int | None]:
-        """Return the ranks of two processes: the one with the planes before this process's planes, and the one after.
+        """Return the ranks of the processes whose planes lie before, and after, the planes of this process.
 
         A rank is None if the planes of this process end at an open end of the lattice.
         """
@@ -561,11 +561,11 @@ class _StoredState:
         self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
-        """Return the path of the file for the state after ``count`` frames: one of two paths, in turn."""
+        """Return the path of the file for the state after ``count`` frames. Two paths are used alternately."""
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:
-        """Store the present state, and then its description, with the energies of all frames until now."""
+        """Store the present state, and then its description. ``energy`` has the energies of all frames until now."""
         domain, count = self.domain, len(energy)
         state_file = _SharedArrayFile(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
         state_file.write(0, domain.saved_state())
@@ -577,7 +577,7 @@ class _StoredState:
                 file.write(json.dumps({"identity": self.identity, **record}).encode())
 
     def restored(self) -> list[float]:
-        """Restore the stored state, and return the energies of all frames until then; [] if nothing is stored.
+        """Restore the stored state, and return the energies of all frames up to this state; [] if nothing is stored.
 
         Raises `ValueError` if another run has stored the state.
         """

@@ -15,7 +15,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-#: Folders of devices and open file descriptors. These are written directly, since they cannot be replaced.
+#: Folders of devices and of open file descriptors. Files in these folders are written directly, since they cannot be
+#: replaced.
 _DEVICES = ("/dev/", "/proc/")
 
 
