@@ -44,7 +44,7 @@ settings_option = click.option(
     "--set", "settings", metavar="NAME=VALUE", multiple=True, help="Value of a parameter or of an initial coordinate."
 )
 
-#: The option for the scheme of the steps, which overrides the spec.
+#: The option ``--scheme``, which overrides the scheme in the spec.
 scheme_option = click.option("--scheme", type=click.Choice(SCHEMES), help="Scheme of the steps; overrides the spec.")
 
 #: The option for the profile of code that phigen itself runs; ``profile:`` in a spec only applies to ``phigen build``.

@@ -20,7 +20,7 @@ OPTION = "--expand"
 
 
 def expanded_text(spec: Spec, sizes: str) -> str:
-    """Return the text of a spec without lattice, which describes a small lattice site by site.
+    """Return the text of a spec that describes a small lattice site by site, without the key ``lattice``.
 
     ``sizes`` are sizes such as ``3x3``, or the name of a run with the sizes.
     """

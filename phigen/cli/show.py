@@ -60,8 +60,8 @@ def command(
 
     For a series, the formulas of the step are the maps α and β of the bi-realisation, and the terms S_1 … S_k.
 
-    For a lattice the formulas are those of one site. --expand prints a small lattice as an ordinary spec, with one
-    coordinate for each field of each site.
+    For a lattice the formulas are those of one site. --expand prints a small lattice as a spec without lattice, with
+    one coordinate for each field of each site.
     """
     from phigen.compiler import compile_proved
     from phigen.symbolic.readable import SHOWN
