@@ -41,7 +41,7 @@ COORDINATES = 256
 ENTRIES = 1_000
 #: Largest length of the name of a coordinate, parameter, definition, Casimir or run.
 NAME_LENGTH = 63
-#: Largest lengths of a text of one line, and of a text of several lines.
+#: Largest numbers of characters: LINE_LENGTH of a text of one line, TEXT_LENGTH of a text of several lines.
 LINE_LENGTH = 500
 TEXT_LENGTH = 20_000
 #: Largest number of terms of the generating function, and largest order of a method.
@@ -51,7 +51,7 @@ CORRECTIONS = 8
 #: Largest number of operations in one generated function. The gradient and the Hessian of the generating function have
 #: the most operations. At the limit, the C has about 5 MB and compiles in about a minute.
 OPERATIONS = 100_000
-#: Largest number of monomials of a term S_i of the Hamilton–Jacobi series. After a term of this size, the next term
+#: Largest number of monomials in a term S_i of the Hamilton–Jacobi series. After a term of this size, the next term
 #: would take minutes to compute.
 SERIES_TERMS = 50_000
 #: Largest number of exponents that are stored when a polynomial and its derivatives are expanded; each monomial has one
@@ -60,7 +60,7 @@ CELLS = 8_000_000
 #: If the proof of a bi-realisation is estimated to need more products of terms than this, the bi-realisation is checked
 #: at sample points instead. At the limit, the proof takes ten seconds.
 PROOF_PRODUCTS = 20_000_000
-#: SEED: largest seed of noise, which has 64 bits. MEMBERS: largest number of members, whose numbers have 32 bits.
+#: SEED: largest seed of noise; seeds have 64 bits. MEMBERS: largest number of members; their indices have 32 bits.
 SEED, MEMBERS = 2**64 - 1, 2**32
 #: Largest seed of a sweep. The random generator takes seeds of 64 bits, of which the sign bit must be 0.
 SWEEP_SEED = 2**63 - 1

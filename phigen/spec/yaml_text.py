@@ -12,8 +12,8 @@ from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, V
 from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
-#: A sum with more than _LENGTH characters, or more than _NODES numbers, names and operators, is divided into definitions.
-#: The bounds are nine tenths of the limits for expressions, since parentheses may be added.
+#: A sum is divided into definitions if it has more than _LENGTH characters, or more than _NODES numbers, names and
+#: operators. The bounds are nine tenths of the limits for expressions, since parentheses may be added.
 _LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
 _PLAIN = re.compile(r"[A-Za-z0-9_+*/(). ^-]*")
