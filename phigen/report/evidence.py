@@ -19,7 +19,7 @@ from phigen.study.summary import Drift, Summary
 from phigen.study.verification import Check, Verification
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
 
-#: Tile of the summary, which shows a large number with a label: CSS class, number, label, note.
+#: Tile of the summary: CSS class, number, label, note. The number is shown in large digits.
 Tile = tuple[str, str, str, str]
 
 _GOOD, _BAD, _UNSURE = "good", "bad", "unsure"

@@ -1,4 +1,4 @@
-"""Live panel of a page, which runs the generated JavaScript beside RK4, with sliders for all settings."""
+"""Live panel of a page. It runs the generated JavaScript beside RK4, with sliders for all settings."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Live:
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the panel, which changes one setting.
+    """Slider of the panel. The slider changes one setting.
 
     On the scale "log", the ends of the slider stand for the default value multiplied and divided by ``reach``. On the
     scale "linear", they stand for the default value plus and minus ``reach``. ``low`` and ``high`` are the positions of
@@ -287,7 +287,7 @@ def _leaf(system: System, group: Group) -> int | None:
 
 
 def _caption(system: System, conserved: Sequence[Mapping[str, object]], is_leaf_drawn: bool) -> str:
-    """Return the text above the panel, which describes the picture."""
+    """Return a description of the picture, as text above the panel."""
     introduction = "Two solvers integrate the motion from the same start, in your browser. "
     properties = ["conserves its energy"] if any(q["name"] == "energy error" for q in conserved) else []
     if is_leaf_drawn:
