@@ -101,8 +101,9 @@ def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Fl
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
     """Return the line (points, 3), moved onto the leaf by Newton steps.
 
-    The points stay in the plane of the line, which is perpendicular to ``axis``. Points at which Newton's method fails,
-    for instance at a pole of the Casimir, are left out. There the line is cut, so the result may be several lines.
+    The line lies in a plane perpendicular to ``axis``, and its points stay in this plane. Points at which Newton's
+    method fails, for instance at a pole of the Casimir, are left out. The line is cut there, so the result may be
+    several lines.
     """
     points = line.copy()
     with np.errstate(all="ignore"):

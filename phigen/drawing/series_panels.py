@@ -10,7 +10,7 @@ import numpy as np
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: MAX_PANELS: largest number of panels of observables in a figure of a run. HEIGHT: height of a panel in inches.
+#: MAX_PANELS: largest number of observables with a panel in the figure of a run. HEIGHT: height of a panel in inches.
 MAX_PANELS, HEIGHT = 4, 1.4
 
 
