@@ -94,7 +94,7 @@ def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -
 
 
 def _flow(state: Floats, t: float) -> Floats:
-    """Return the image of a state under the exact flow over the time t, which is `printed_map` without the dilation."""
+    """Return the image of a state under the exact flow over the time t: `printed_map` without the dilation."""
     label = state @ (-1, 1, 1)
     image = printed_map(state, t)
     flow: Floats = image - label * (math.exp(t**K) - 1) / 2 * np.array([0.0, 1.0, 1.0])

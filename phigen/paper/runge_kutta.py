@@ -45,7 +45,7 @@ class ClassicalCourse:
 
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
-    """Return a run by the classical method ``method``, which starts at x0 (DIM,).
+    """Return a run that starts at x0 (DIM,), by the classical method ``method``.
 
     Raises `ToolchainError` without a C compiler.
     """
