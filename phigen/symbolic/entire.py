@@ -1,7 +1,7 @@
 """Entire functions for the formulas of exact flows. They avoid divisions by a frequency, which may be 0.
 
-- ``cosroot``(s) = cos √s and ``sinroot``(s) = sin(√s)/√s or, for s < 0, cosh √−s and sinh(√−s)/√−s. With these two
-  functions, one formula holds for rotations and for hyperbolic motions. They satisfy cosroot² + s·sinroot² = 1
+- ``cosroot``(s) = cos(√s) and ``sinroot``(s) = sin(√s)/√s. For s = −r < 0 their values are cosh(√r) and sinh(√r)/√r.
+  With these functions, one formula holds for rotations and for hyperbolic motions; cosroot² + s·sinroot² = 1
 - ``arcroot``(s) = (√s − sin √s)/√s³
 - ``exprel``(s) = (e^s − 1)/s
 - ``sinroot1``, ``arcroot1`` and ``exprel1`` are the derivatives of sinroot, arcroot and exprel, for tangent maps

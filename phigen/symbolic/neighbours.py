@@ -75,7 +75,7 @@ class Neighbours:
         return base, tuple(offsets.values())
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return the symbols in the expressions that are values at sites: symbol → its name and its offset."""
+        """Return those symbols in the expressions that stand for values at sites: symbol → name and offset."""
         return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
 
     def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:

@@ -1,6 +1,6 @@
 """The function φ of the exponential bi-realisation, and its first two derivatives.
 
-φ(s) = (1 − w cot w)/s with w = √s/2. The function is analytic at s = 0 and for s < 0, where cot becomes coth. Its poles
+φ(s) = (1 − w cot w)/s with w = ½√s. The function is analytic at s = 0 and for s < 0, where cot becomes coth. Its poles
 are s = 4π²n² for n ≥ 1. φ occurs in the even part of z/(1 − e^{−z}), which is (z/2) coth(z/2) = 1 + z² φ(−z²).
 
 - φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
@@ -47,7 +47,7 @@ def order_of(name: str) -> int:
 def coefficient(order: int, n: int) -> Fraction:
     """Return the exact coefficient of sⁿ in the Taylor series of φ, φ′ or φ″; ``order`` is the number of primes.
 
-    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation.
+    Here and below, φ(s) = (1 − w cot w)/s with w = ½√s, the function of the exponential bi-realisation.
     """
     return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
 
@@ -110,10 +110,10 @@ def value(library: Any, order: int, s: Any) -> Any:
 
 
 def _closed(order: int, s: Any, c: Any) -> Any:
-    """Return φ(s) = (1 − c)/s or a derivative of φ, where c is w cot w with w = √s/2 or, for s < 0, w coth w with w =
-    √−s/2.
+    """Return φ(s) = (1 − c)/s, or a derivative of φ.
 
-    The derivatives follow from the Riccati equation sφ' = 1/8 − (3/2)φ + ½sφ².
+    For s > 0, c is w cot w with w = ½√s. For s < 0, c is w coth w with w = ½√(−s). The derivatives follow from the
+    Riccati equation sφ' = 1/8 − (3/2)φ + ½sφ².
     """
     phi0 = (1 - c) / s
     if order == 0:

@@ -140,8 +140,8 @@ class Taylor:
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
         """Compute one more coefficient of the series of every node (the next level).
 
-        ``inputs`` maps each of the ``variable_symbols`` to its coefficient at this level. ``running`` is a stage of the
-        progress display, which counts the nodes.
+        ``inputs`` maps each of the ``variable_symbols`` to its coefficient at this level. The stage ``running``
+        of the progress display counts the nodes.
         """
         for count, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]

@@ -95,7 +95,7 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 
     For a small part of an orbit the initial value is a power series in t, or the first term t/r of the series. For a
     larger part of an elliptic orbit it is βt/μ, since the average rate of s is β/μ. For a larger part of a hyperbolic
-    orbit it is 1/√−β; the iteration doubles s as long as s is too small.
+    orbit it is 1/√(−β); the iteration doubles s as long as s is too small.
     """
     u = t / r
     if abs(beta) * u**2 > 1:
@@ -109,7 +109,7 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
     """Return (residual, scale, slope, bend) for the equation of the universal anomaly s.
 
-    The scale is the sum of the absolute values of the terms of the equation. Slope and bend are the first two
+    The scale is the sum of |T| over the terms T of the equation. Slope and bend are the first two
     derivatives of the residual with respect to s.
     """
     from phigen.symbolic import entire
