@@ -92,8 +92,9 @@ def force_statements(system: System) -> Iterator[Statement]:
 def noise_statements(system: System) -> Iterator[Statement]:
     """Yield the statements about noise.
 
-    The first statement says whether the sources of noise commute, which decides the strong order. A second statement
-    says that the density exp(−H/T) is stationary for some temperature T. The second statement is yielded only if it holds.
+    The first statement says whether the sources of noise commute, which decides the strong order. The second statement
+    says that the density exp(−H/T) is stationary for some temperature T. The second statement is left out unless it
+    holds.
     """
     if not system.noise:
         return
