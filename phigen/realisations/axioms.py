@@ -35,9 +35,9 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
     """Return the statements on α and β at p = 0, on their brackets, and on the simplified forms that the solver
     uses.
 
-    If the spec states π in other coordinates y (a pull-back), the brackets are proved in y. α and β may be truncated
-    series in p: for truncated bi-realisations, and if steps follow paths. If these series are correct up to degree d in
-    p, the brackets are proved up to degree d − 1.
+    If the spec states π in other coordinates y (a pull-back), the brackets are proved in y. For truncated
+    bi-realisations, and if steps follow paths, α and β are truncated series in p. If these series are correct up to
+    degree d in p, the brackets are proved up to degree d − 1.
     """
     if realisation.inner is not None and is_composed(system, realisation):
         return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]

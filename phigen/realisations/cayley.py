@@ -52,7 +52,7 @@ class _Escape:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the Cayley bi-realisation of a linear or affine π, which is symmetric.
+    """Return the Cayley bi-realisation of a linear or affine π. The bi-realisation is symmetric.
 
     Raises `SpecError` if π is neither linear nor affine, or if P E_i P is outside the algebra in every known faithful
     representation. The message names the representations that were tried, with a product outside the algebra for each.

@@ -16,9 +16,9 @@ KIND = "constant"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a constant π, which is symmetric and defined for all (x, p).
+    """Return the bi-realisation of a constant π.
 
-    Raises `SpecError` if π is not constant.
+    The bi-realisation is symmetric, and α and β are defined for all (x, p). Raises `SpecError` if π is not constant.
     """
     if not isinstance(system.shape, Constant | Canonical):
         raise refuse(f"birealisation {KIND} needs a constant π; this one is {system.shape}", "try auto")

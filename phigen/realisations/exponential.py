@@ -30,10 +30,10 @@ REFERENCE = f"{PAPER}, the proposition on Lie–Poisson structures, with τ = ex
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the exponential bi-realisation of a linear or affine π, which is symmetric.
+    """Return the exponential bi-realisation of a linear or affine π.
 
-    The bi-realisation is in closed form if phigen knows one; otherwise the solver follows paths. Raises `SpecError` if
-    π is neither linear nor affine.
+    The bi-realisation is symmetric. It is in closed form if phigen knows one; otherwise the solver follows paths.
+    Raises `SpecError` if π is neither linear nor affine.
     """
     closed = closed_form(system)
     if closed is not None:

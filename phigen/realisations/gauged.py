@@ -7,8 +7,8 @@ this constant π is transformed to the coordinates x. With u_i = Σ_j A_ij g_j(x
 
 For the following functions g, the flow for the time t is elementary, and the formula has no cancellation:
 
-- g = ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac. If w² is negative, tan and √−w²
-  replace tanh and w. If the sign of w² depends on parameters, T = t/(1 − sφ(s)) with s = −4w²t² and φ as in
+- g = ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac. If w² is negative, tan and
+  √(−w²) replace tanh and w. If the sign of w² depends on parameters, T = t/(1 − sφ(s)) with s = −4w²t² and φ as in
   `phigen.symbolic.special`
 - g = bx + c: x + g(x)(e^{bt} − 1)/b; for c = 0 this gives the log-canonical bi-realisation
 - g = c e^{kx}: x − log(1 − kt g(x))/k
@@ -47,7 +47,7 @@ class _Motion:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j), which is symmetric.
+    """Return the bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j). The bi-realisation is symmetric.
 
     Raises `SpecError` if π does not have this form, or if phigen knows no formula for the flow of some g_i.
     """

@@ -48,13 +48,13 @@ KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a Poisson spray, which is symmetric.
+    """Return the bi-realisation of a Poisson spray.
 
-    The bi-realisation is exact if phigen finds a closed form; otherwise it is a truncated series. ``choice.spray`` is
-    ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves each x_j p_j),
-    ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j. ``choice.degree`` is the degree in p of
-    a truncated series. Let k be the order of the method, rounded up to an even number. The default is k + 1. Then a
-    step is a Poisson map up to O(h^(k+2)).
+    The bi-realisation is symmetric. It is exact if phigen finds a closed form; otherwise it is a truncated series.
+    ``choice.spray`` is ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which
+    conserves each x_j p_j), ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j.
+    ``choice.degree`` is the degree in p of a truncated series. Let k be the order of the method, rounded up to an
+    even number. The default is k + 1. Then a step is a Poisson map up to O(h^(k+2)).
 
     Raises `SpecError` unless each f_j is a quadratic form in p, and for a degree that is too small for the order.
     Raises `LimitError` for series that are too long.

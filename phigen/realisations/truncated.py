@@ -49,8 +49,9 @@ class _HomogeneousParts:
         return self._slopes[key]
 
     def bracket(self, e: int, f: int, degree: int) -> Poly:
-        """Return the part of this ``degree`` in p of the bracket of expression number ``e`` and expression number
-        ``f``.
+        """Return a homogeneous part of a bracket: the part of this ``degree`` in p.
+
+        The bracket is that of the expressions number ``e`` and number ``f``.
         """
         result = self.tower.zero
         for k in range(degree + 2):
