@@ -21,13 +21,13 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
-#: Number of characters of markup above which a part of a formula is replaced by an ellipsis.
+#: A part of a formula is replaced by an ellipsis if its markup has more characters than this.
 LONGEST = 60_000
 
 #: A polynomial with at most this number of terms is reordered if it would begin with a minus sign.
 FEW = 4
 
-#: Number of characters of an exponent above which a power of e is written as exp(…).
+#: A power of e is written as exp(…) if the markup of its exponent has more characters than this.
 _LONG_EXPONENT = 250
 
 _GREEK = {
@@ -335,7 +335,7 @@ def _one(factor: Factor) -> Sum:
 def exponential(number: str) -> tuple[str, list[str]]:
     """Return the equation E = exp(hA) − 1 in markup: its left side, and the two parts of its right side.
 
-    ``number`` is the number of the matrix, which follows the letters E and A; it is "" if there is only one matrix.
+    The number of the matrix, ``number``, follows the letters E and A; it is "" if there is only one matrix.
     """
     left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
     return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]
