@@ -166,7 +166,7 @@ class _Compiled(ABC):
 
     @property
     def stage(self) -> Order:
-        """Order and number of terms of a single map of a step.
+        """The order of a single map of a step, and the number of its terms S_1, S_2, ….
 
         If a step is one map, these are the order and the number of terms of the method. If a step is composed of
         several maps, each map has order 2 and one term.

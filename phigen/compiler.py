@@ -51,8 +51,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Order of the series whose number of operations is counted, as a lower bound for series of higher orders, which take
-#: long to build.
+#: Series of high order take long to build. A lower bound for the cost of a series is computed from the series of this
+#: order.
 PREVIEW_ORDER = 4
 
 #: A spec may write out the equations of a lattice site by site. phigen recognises lattices with at least this number of
