@@ -51,17 +51,22 @@ HEAD = """# Gallery
 
 phigen ships the systems of this page. Each picture links to the entry of its system below. `phigen run NAME` integrates
 a system, `phigen show NAME` prints its formulas, and `cp "$(phigen list --path NAME)" .` copies its spec, as a start
-for your own.
+for your own spec.
 """
 SYSTEMS = """
 ## Systems
 
-Each figure shows one run: the run of the spec with the most steps. A dot marks the initial state. If a system has three
-coordinates, the figure also shows the level surface of its first Casimir. The tables list the largest errors over the
-whole run. The first column is for phigen. If there is a second column, it is for the classical method that the spec
-names, with the same step size. Errors are relative to the initial value, unless the initial value is nearly 0. "H,
-balance" is the error of the energy balance of a system with time, forces or damping: the error of H minus the work
-done. "H, change" is the largest change of H in a run with noise.
+Each figure shows one run: of the runs in the spec, the one with the most steps. A dot marks the initial state. If a
+system has three coordinates, the figure also shows the level surface of its first Casimir. The line below the formulas
+names the form of the brackets π, the method, and the run. The page on the mathematics explains the [forms of π and the
+bi-realisations](mathematics.md#catalogue), [splittings](mathematics.md#splitting) and [Gauss
+collocation](mathematics.md#gauss-collocation).
+
+The tables list the largest errors over the whole run. The first column of numbers is for phigen. If there is a second
+column of numbers, it is for the classical method that the spec names, with the same step size. Errors are relative to
+the initial value, unless the initial value is nearly 0. "H, balance" is the error of the energy balance of a system
+with time, forces or damping: the error of H minus the work done. "H, change" is the largest change of H in a run with
+noise.
 """
 LATTICES = """
 
