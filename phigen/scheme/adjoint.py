@@ -46,8 +46,7 @@ def pulled_back(
     variables: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """Return the kernel that computes cotangents of some inputs of ``kernel`` from the cotangents of some
-    values.
+    """Return the transpose of ``kernel``: it computes cotangents of inputs from the cotangents of some values.
 
     The keys of ``seeds`` are the new inputs, which hold the cotangents of the values listed under the key.
     ``variables`` maps the name of an input array of ``kernel`` to its symbols. For an array ``x`` the new kernel has

@@ -187,10 +187,9 @@ def _element_after_flow(system: System, group: Group, turning: Turning, time: Ex
 
 
 def uniform(system: System) -> bool:
-    """Whether Casimirs in H rotate the body at a constant angular velocity, as seen in the frame in which the momentum
-    is constant.
+    """Whether Casimirs in H rotate the body at a constant angular velocity, in the frame with constant momentum.
 
-    Forces, a monitor, or an H that depends on the time make the velocity vary.
+    The velocity varies if there are forces or a monitor, or if H depends on the time.
     """
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)

@@ -1,4 +1,4 @@
-"""Numbers of operations in products of matrices of expressions, counted without building the products.
+"""Counts of operations in products of symbolic matrices. The products themselves are not built.
 
 The matrix a' = ∂_xα + ∂_pα · Hess S_h makes up nearly all of the step of a large system. Building a node of an
 expression graph takes some fifty times as long as counting it. For the count, a node is represented by an integer;
@@ -60,8 +60,8 @@ def newton_operations(
 
 
 def may_have(dimension: int, limit: int) -> bool:
-    """Whether the matrices of a step can have more than ``limit`` operations: a product of full n×n matrices has about
-    2n³."""
+    """Whether the matrices of a step may need more than ``limit`` operations. A product of full n×n matrices needs
+    about 2n³."""
     return 4 * dimension**3 > limit
 
 

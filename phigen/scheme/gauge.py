@@ -267,8 +267,8 @@ def _state_terms(series: PolynomialSeries, system: System) -> int:
 def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
     """Return the kernels with which the solver chooses the multiples λ of Casimirs C; None if it chooses none.
 
-    One kernel computes the error vector π∇S_3. The other computes the scalar products of ∇H and the ∇C, which set the
-    scale of λ in the search.
+    One kernel computes the error vector π∇S_3. The other kernel computes scalar products of the gradients ∇H and ∇C.
+    These products set the scale of λ in the search.
     """
     gauge = gauged.gauge
     if not gauge.free:

@@ -80,7 +80,7 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
     elements.
 
     With ``structure: exact``, a step in these variables is exactly a Poisson map. Raises `SpecError` if phigen knows no
-    such variables, or if a vector force acts on coordinates with group elements or logarithms.
+    variables of this kind, or if a vector force acts on coordinates with group elements or logarithms.
     """
     if spec.structure == "to truncation":
         return direct(system)

@@ -1,8 +1,8 @@
 """Derivatives of the ends of a path with respect to its mean y, from those with respect to its middle m.
 
 The runtime computes a path as a Taylor series about its middle. Let the path take the time from −1 to 1 under the
-covector p/2, so that it starts at α and ends at β. If ``even`` and ``odd`` are the sums of the even and of the odd
-terms of its Taylor series, then α = even − odd and β − α = 2 odd. The same relations hold for derivatives. Each sum of
+covector p/2, so that it starts at α and ends at β. If ``even`` and ``odd`` are the sums over the even and the odd terms
+of its Taylor series, then α = even − odd and β − α = 2 odd. The same relations hold for derivatives. Each sum of
 derivatives is an n×2n matrix: first the derivatives with respect to m, then those with respect to p.
 """
 
@@ -21,9 +21,9 @@ def along_mean(n: int) -> Kernel:
     """Return the kernel that differentiates α and β − α with respect to the mean y of a path with n
     coordinates.
 
-    Its inputs are the derivatives with respect to the middle m and to p, and Hess S_h. Let M and N be the derivatives
-    of the mean with respect to m and p. For fixed p, the derivative of m with respect to y is M⁻¹. If p = ∇S_h(y)
-    varies with y, the derivative of m is M⁻¹ (1 − N Hess S_h).
+    Its inputs are Hess S_h, and derivatives with respect to m, the middle of the path, and to p: those of ``even``,
+    ``odd`` and the mean. Let M and N be the derivatives of the mean with respect to m and p. For fixed p, the
+    derivative of m with respect to y is M⁻¹. If p = ∇S_h(y) varies with y, the derivative of m is M⁻¹ (1 − N Hess S_h).
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))

@@ -72,7 +72,7 @@ class Observables:
 class FreeGauge:
     """The Casimirs whose multiples the solver chooses for each trajectory, and two kernels for this choice.
 
-    ``guide`` is the error vector π∇S_3; ``products`` are the scalar products of the gradients of H and of the Casimirs.
+    ``guide`` is the error vector π∇S_3; ``products`` are scalar products of gradients, those of H and of the Casimirs.
     """
 
     casimirs: tuple[str, ...]

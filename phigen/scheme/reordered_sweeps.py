@@ -19,7 +19,7 @@ MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield all orders of the ``fields`` except the given one, cyclic permutations first.
+    """Yield the orders of ``fields`` that differ from the present order, cyclic permutations first.
 
     Nothing is yielded for more than `MOST_FIELDS` fields.
     """

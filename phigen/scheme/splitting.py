@@ -1,4 +1,4 @@
-"""Programs of splittings: the kernels of the flows of the parts of H, and the order of these flows in a step."""
+"""Programs of splittings. Each part of H has a kernel for its flow; a schedule has the order of the flows in a step."""
 
 from __future__ import annotations
 

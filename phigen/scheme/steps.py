@@ -45,8 +45,8 @@ class PathAdjoint:
 class Adjoint:
     """The transpose of a step, for gradients.
 
-    The adjoint consists of the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of
-    ``refresh``, and of the ``path`` that the step follows, if any.
+    ``steps`` are the transposed kernels of the step, or of its flows. ``prepare`` and ``refresh`` are the transposes of
+    the kernels with these names. ``path`` is the transpose of the path that the step follows, if there is one.
     """
 
     steps: tuple[Kernel, ...]
@@ -462,7 +462,7 @@ class Gauss(_Staged):
 
 
 class _Scheduled(_Staged):
-    """Base class of steps that are sequences of flows in the order of a schedule."""
+    """Base class of steps that apply flows in the order of a schedule."""
 
     schedule: Schedule
     composition: str
@@ -688,10 +688,9 @@ class Equation:
     """The implicit equation of a stage on a lattice: y = x − (α − x)(y, h∇H(y)); then (β − α)(y, h∇H(y)) is added to x.
 
     The kernels have the inputs of a sweep, with the values of y as ``site``. ``relax`` is the right-hand side at a
-    site; it also reads ``start``, the x of this site. ``advance`` is the increment of x. ``slope`` is the derivative of
-    ``relax`` in the direction of a variation of y, for Newton's method. ``tangents`` are the derivatives of ``relax``
-    in the direction of a variation of x, and of ``advance`` in the direction of a variation of y, if tangent maps were
-    requested.
+    site; it also reads ``start``, the x of this site. ``advance`` is the increment of x. For Newton's method, ``slope``
+    is the derivative of ``relax`` along a variation of y. If tangent maps were requested, ``tangents`` are two more
+    derivatives: that of ``relax`` along a variation of x, and that of ``advance`` along a variation of y.
     """
 
     relax: Kernel
@@ -815,7 +814,7 @@ class Sweeps(_Scheduled):
 
     @property
     def rate_kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of the energies of the two parts of H for the monitor ``log``; empty without this monitor."""
+        """The kernels for the monitor ``log``, which compute the energies of A and B; empty without this monitor."""
         return self.rates.kernels if self.rates else ()
 
     @property

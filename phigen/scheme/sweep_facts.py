@@ -79,7 +79,7 @@ def site_blocks(program: Program, step: Sweeps) -> bool:
 def waves(program: Program, step: Sweeps) -> bool:
     """Whether wavefront blocking applies.
 
-    It applies to splittings on grids with several flows in a step, in the profile ``fast``, if there are neither noise
+    It applies in the profile ``fast`` to splittings on grids whose steps have several flows, if there are neither noise
     nor boundary seams. On grids a flow reads only neighbours, as wavefront blocking requires.
     """
     is_splitting = step.equation is None and step.partners is None and not step.sites.seams
@@ -106,7 +106,7 @@ def takes(program: Program, step: Sweeps) -> bool:
     """Whether cotangents that a flow passes to other sites of a grid are added by the loop of the next flow in the
     reverse pass, instead of by separate loops.
 
-    Loops that add cotangents have long code, and are used only in the profile ``fast``.
+    Loops that add these cotangents are long, and are used only in the profile ``fast``.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
@@ -148,9 +148,10 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether each row needs a list of the rows that contribute to its cotangents, apart from the list of the rows that
-    it reads. The lists differ if an axis across rows has open ends: beyond an open end, a row reads a mirrored row with
-    weight 0, but receives nothing.
+    """Whether each row needs a list of the rows that contribute to its cotangents.
+
+    Each row has a list of the rows that it reads. The two lists differ if an axis across rows has open ends: beyond an
+    open end, a row reads a mirrored row with weight 0, but receives nothing.
     """
     return any(step.sites.open[:-1])
 

@@ -78,7 +78,7 @@ class _Parts:
         return self.functions.total(terms)
 
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
-        """Return the terms of degree ``degree`` in p of component ``f`` of (α, β).
+        """Return those terms of the component ``f`` of (α, β) that have the degree ``degree`` in p.
 
         With ``c``, the component is first differentiated with respect to x_c.
         """
@@ -95,5 +95,5 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Differentiate the terms of degree ``degree`` in p of component ``f`` of (α, β) with respect to p_c."""
+        """Return the derivative of `_part(f, degree)` with respect to p_c."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

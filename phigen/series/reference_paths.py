@@ -44,8 +44,8 @@ def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], 
 def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
     """Return one component of the part of π(m)p that has the degree ``degree`` + 1 in p.
 
-    This part is p times the part of π(m) that has the degree ``degree``. ``deviation`` is m − x. ``row`` has the Taylor
-    coefficients of the entries of π in the row of this component.
+    This part is p times the part of π(m) that has the degree ``degree``. ``deviation`` is m − x. ``row`` is the
+    row of π for this component; it has the Taylor coefficients of each entry.
     """
     return functions.total(
         deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
