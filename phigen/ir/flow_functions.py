@@ -122,7 +122,7 @@ class FlowFunctions:
 
 
 def _row(number: ir.Value) -> ir.Value:
-    """Return the address of row ``number`` of the matrix of coefficients."""
+    """Return the address of row ``number`` in the matrix of coefficients."""
     return ir.Binary("+", COEF, ir.Binary("*", number, ROW_SIZE))
 
 

@@ -29,7 +29,7 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class LatticeLoops:
-    """Builder of the functions of all kernels of a lattice program."""
+    """Builder of the functions that evaluate the kernels of a lattice program."""
 
     program: Program
     step: Sweeps
@@ -61,7 +61,7 @@ class LatticeLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function of the kernel of an observable: a density, an energy or the vector field.
 
-        An energy at a site includes half of the energy of each bond or pair of the site.
+        The energy at a site includes one half of the energy of each bond or pair to which the site belongs.
         """
         others = self.step.others
         gather = others.sums_of(kernel)

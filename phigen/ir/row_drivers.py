@@ -212,7 +212,7 @@ class _Driver:
 
 
 def at(sites: Sites) -> ir.Value:
-    """Return the argument by which a call receives a row segment, or the given sites of this segment."""
+    """Return the argument by which a call receives a row segment or, unless ``sites`` is None, these sites of it."""
     return ir.Called("between", (SEGMENT, *sites)) if sites else SEGMENT
 
 

@@ -175,7 +175,7 @@ Lanes = Blocks | Packs | Rows | Stages | Traces
 def in_lanes(program: Program) -> Lanes | None:
     """Return the parts of a program that are computed in lanes.
 
-    Returns None if the spec excludes lanes, if the program has no such parts, or if they would need too much stack.
+    Returns None if the spec excludes lanes, if no parts can be computed in lanes, or if they would need too much stack.
     """
     lowering = LOWERINGS.get(program.step.kind.name)
     return lowering(program, program.step) if lowering else None

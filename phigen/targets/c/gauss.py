@@ -14,7 +14,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: Threshold for the end of sweeps in single precision, which `phigen.targets.c.real.threshold` converts to 1e-9.
+#: Threshold for the end of sweeps in single precision; `phigen.targets.c.real.threshold` converts this number to 1e-9.
 #: Relative to the rounding error of its precision, 1e-9 is about as large as 2e-18, the threshold in double precision.
 #: If 2e-18 were converted, the threshold would be larger, and the energy error of 1e5 steps of Hénon–Heiles would be
 #: 2e-5 instead of 5e-7.

@@ -25,13 +25,14 @@ class Spills:
     size: int
 
     def is_within(self, coordinates: int, coefficients: int) -> bool:
-        """Whether the measured system has at most the given numbers of coordinates and coefficients."""
+        """Whether the measured system has at most these numbers of ``coordinates`` and ``coefficients``."""
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Measurements. A step that has at least as many coordinates and coefficients as a measured system spills from
-#: registers to memory: about as many bytes as that system, or more. Steps with fewer than 6 coordinates and at most 40
-#: coefficients do not spill. These rules hold for 52 builds of 19 example systems in ``specs``, with orders 2 to 6.
+#: Measurements, from which two rules follow. First, a step spills values from registers to memory if it has at least as
+#: many coordinates and coefficients as a measured system; it spills about as many bytes as that system, or more.
+#: Second, steps with fewer than 6 coordinates and at most 40 coefficients do not spill. The rules were checked on 52
+#: builds of 19 example systems in ``specs``, at the orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),

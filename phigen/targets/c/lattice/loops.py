@@ -101,13 +101,13 @@ class RowLoops:
     def versions(self) -> Mapping[str, str]:
         """The versions of elementary functions in loops that have a single form.
 
-        These are the versions for SIMD lanes; in short code, only those that are correct for all arguments.
+        These are the versions for SIMD lanes. Profiles other than ``fast`` have only those for all arguments.
         """
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the versions of elementary functions that loops call. There is an entry for each suffix of names of
-        loops.
+        """Return the forms of ``loops``: for the suffix of each form, the versions of elementary functions that are
+        called.
 
         There are two forms, for small arguments and for all arguments, if one of the ``loops`` calls a function whose
         fast version fails at large arguments. ``rows`` has the data on loops over sites in SIMD lanes; if it is None,
@@ -118,8 +118,8 @@ class RowLoops:
         return forms_of(loops, rows.small_argument, rows.limited, self.versions)
 
     def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
-        """Yield the loop after the passes on the level of sites. Fast code has a second loop, for sites near open
-        ends.
+        """Yield the loop after the passes on the level of sites. In the profile ``fast``, there may be a second loop,
+        for sites near open ends.
         """
         full_range_doc = f"as {self.program.name}_{loop.name}_near, for arguments of any size"
         doc = full_range_doc if form == "_full_range" else loop.doc

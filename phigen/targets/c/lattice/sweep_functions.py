@@ -89,8 +89,8 @@ class _Call:
     If ``order`` is not empty, the loop reads the fields in this order. If ``bonds`` is not empty, it reads the
     parameters at bonds in this order. Before the call, two values are stored in the record of the segment: the
     ``colour`` of the sweep, and its ``window``, the set of boundary seams that the sweep treats. ``shared`` is the name
-    of the loop if several parts of H call it. ``others`` are calls of other loops with the same effect, one of which
-    may replace this call.
+    of the loop if several parts of H call it. ``others`` are calls with the same effect, but of other loops. Each of
+    them may replace this call.
     """
 
     loop: ir.Function
@@ -187,7 +187,7 @@ class _PartLoops:
         """Return the calls that apply the flow of a part of H to a row segment, for each form of elementary
         functions.
 
-        In short code, sweeps may share a loop if they differ only in the order of the fields.
+        In profiles other than ``fast``, sweeps may share a loop if they differ only in the order of the fields.
         """
         layout, program = self.loops.layout, self.loops.program
         forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
