@@ -86,8 +86,8 @@ class FlowFunctions:
         yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
 
     def corrector(self, schedule: Schedule) -> ir.Function:
-        """Return the function of the corrector, which alternates between the flows of two parts. It is called before
-        the first step of a run and, with other durations of the flows, after the last step.
+        """Return the function of the corrector, which alternates between the flows of two parts. The function is called
+        before the first step of a run and, with other durations of the flows, after the last step.
         """
         (outer, first), *others = schedule.begin
         (_, last), *_ = schedule.end

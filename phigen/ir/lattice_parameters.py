@@ -79,8 +79,8 @@ def copies(
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
-    """Return the statement that sets the pointers in ``params`` to null. It comes after the loop that copies the
-    arrays of the caller.
+    """Return the statement that sets the pointers in ``params`` to null. The statement comes after the loop that copies
+    the arrays of the caller.
     """
     first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
     return ir.Assign(first, NULL, too=tuple(others))

@@ -1,5 +1,5 @@
-"""Transposes of flows. They receive the state after a flow, and recompute the state before it by the inverse
-flow.
+"""Transposes of flows. A transpose receives the state after a flow, and recomputes the state before the flow by the
+inverse flow.
 
 With these transposes, the reverse pass of members of an ensemble stores few states.
 """

@@ -52,8 +52,8 @@ def back(path: PathAdjoint) -> list[Kernel]:
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels with which a Taylor expansion begins. They compute p = ∇S_h with its derivative, and the
-    coefficients of order 0 of all series.
+    """Return the kernels with which a Taylor expansion begins. The kernels compute p = ∇S_h with its derivative, and
+    the coefficients of order 0 of all series.
     """
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)

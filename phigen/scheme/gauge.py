@@ -29,7 +29,7 @@ from phigen.symbolic.tower import Tower
 #: the additional terms cost more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
-#: The gauge makes the error h^i π∇S_i small, where S_i is a term of the generating function. This is the index i.
+#: The gauge makes the error h^i π∇S_i small, where S_i is a term of the generating function. GUIDE is the index i.
 GUIDE = 3
 
 #: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches for a gauge.

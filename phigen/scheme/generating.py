@@ -30,7 +30,7 @@ class GeneratingFunction:
     Hess S_h.
 
     ``form`` says in words how the expressions are written, for instance as polynomials. ``terms`` is the number of
-    terms of a polynomial. ``coefficients`` is the table of the symbols ``c:k`` in the expressions. It includes
+    terms of a polynomial. ``coefficients`` is the table of the symbols ``c:k`` in the expressions. The table includes
     coefficients that every step computes anew. For a monitored system, ``elapsed`` is the duration of a step, ∂S_h/∂e
     with the energy level e. If the spec has a force field ζ, which is added to ∇H, then ``slope`` is ∇S_h + hζ, and
     ``free`` is ∇S_h.

@@ -21,7 +21,9 @@ EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel in the step of a lattice. It determines the arrays that the loops around the kernel use."""
+    """Purpose of a kernel in the step of a lattice. The purpose determines the arrays that the loops around the kernel
+    use.
+    """
 
     OTHER = auto()
     SWEEP = auto()  # the increment of a state by a flow

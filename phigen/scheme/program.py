@@ -105,8 +105,8 @@ class Noise:
     """The sources of noise by name.
 
     In a step each source has as many increments ΔW as ``parts`` says; they are independent and have the same
-    distribution. ``fields`` is the kernel of the vector fields σπ∇g of all sources. It is None for lattices, where each
-    site has independent noise.
+    distribution. ``fields`` is the kernel of the vector fields σπ∇g of all sources. On lattices, ``fields`` is None,
+    since each site has independent noise.
     """
 
     sources: tuple[str, ...]

@@ -11,8 +11,8 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: Name of the kernel for diagonal blocks. It differentiates the right-hand side of the equation y = … at a site with
-#: respect to y at the same site.
+#: Name of the kernel for diagonal blocks. The kernel differentiates the right-hand side of the equation y = … at a site
+#: with respect to y at the same site.
 _BLOCK = "own_slope"
 
 #: Selections of the cotangents that a transposed kernel computes, as pairs of flags. The first flag is for the

@@ -211,8 +211,8 @@ class InnerSolve:
     """Settings of the iteration that solves the implicit equation of a step.
 
     The iteration ends when the error that remains after a correction is estimated to be below ``tolerance``. If
-    ``relative``, errors are measured relative to each coordinate. This is used for log-canonical π, whose coordinates
-    keep their signs.
+    ``relative``, errors are measured relative to each coordinate. Relative errors are used for log-canonical π, whose
+    coordinates keep their signs.
     """
 
     max_iterations: int = 20
@@ -663,7 +663,7 @@ class Sweep:
     that start on no seam. Sites before number ``first`` are not updated.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. A symbol of ``present`` is 1 or
-    0. It says whether a term of H stays within the open ends, or whether a site has the colour of the sweep.
+    0. The symbol says whether a term of H stays within the open ends, or whether a site has the colour of the sweep.
     ``gathered`` are the sums of ``gather``. ``tangent`` is the derivative of the sweep, if tangent maps were requested:
     it adds increments to a variation of the fields. It has the inputs of this sweep, and the input ``varied``.
     """

@@ -1,5 +1,5 @@
-"""Properties of the sweeps of a lattice. They decide which code targets print: for band elimination, wavefront blocking
-and reverse passes.
+"""Properties of the sweeps of a lattice. The properties decide how the code for band elimination, wavefront blocking
+and reverse passes is printed.
 """
 
 from __future__ import annotations

@@ -39,8 +39,8 @@ Source = Callable[[int], Sequence[Coefficients]]
 def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], times: Sequence[Any] = ()) -> Iterator[Any]:
     """Yield S_1, S_2, … without end, as sympy expressions in x and the parameters.
 
-    ``source`` returns the coefficients a_μ of the Taylor series of α in p. It is the result of `closed_form` or of
-    `phigen.series.reference_paths.source_of_paths`. ``times`` has the symbol of the time, if H depends on it.
+    ``source`` returns the coefficients a_μ of the Taylor series of α in p. ``source`` is the result of `closed_form` or
+    of `phigen.series.reference_paths.source_of_paths`. ``times`` has the symbol of the time, if H depends on it.
     """
     terms: list[Any] = []
     while True:

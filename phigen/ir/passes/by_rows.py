@@ -225,7 +225,9 @@ class RowDeclarations:
         self.starts.setdefault(pointer.symbol, (kind, row))
 
     def pointer(self, base: str, line: int = 0) -> ir.Name:
-        """Return the pointer to row ``line`` of the array ``base`` of the state. It is declared at its first use."""
+        """Return the pointer to row ``line`` of the array ``base`` of the state. The pointer is declared at its first
+        use.
+        """
         return self.rows.setdefault((base, line), ir.label(f"{base}_row{line or ''}"))
 
     def before(self) -> Iterator[ir.Statement]:

@@ -183,7 +183,7 @@ class WholeArrays:
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
-        """Return a contribution to a cotangent. It is an array over the sites whose values were read.
+        """Return a contribution to a cotangent. The contribution is an array over the sites whose values were read.
 
         If the values were read at an offset, the array is shifted by this offset. If they were read at an end of bonds
         or pairs, the contributions to each site are summed over its bonds or pairs.

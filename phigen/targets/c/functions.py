@@ -44,8 +44,8 @@ FLOW_FUNCTIONS = tuple(
 )
 
 
-#: In single precision, terms of a series are omitted if they are smaller than the first term times this number. It is a
-#: quarter of a rounding error.
+#: In single precision, terms of a series are omitted if they are smaller than the first term times this number. The
+#: number is a quarter of a rounding error.
 _SINGLE_NEGLIGIBLE = 2.0**-26
 
 C = TypeVar("C", float, Fraction)

@@ -140,8 +140,8 @@ class _Text:
         return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."
 
     def _combine(self, operands: list[tuple[int, int]], operators: list[str], last: tuple[int, int]) -> None:
-        """Insert parentheses in an expression. It is given by the token ranges of its operands, and by the operators
-        between the operands.
+        """Insert parentheses in an expression. The expression is given by the token ranges of its operands, and by the
+        operators between the operands.
         """
         if len(operators) > 1:
             reader = _Operators([*operands, last], operators)

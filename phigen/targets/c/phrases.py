@@ -105,8 +105,8 @@ VALUES = Choice(
     },
 )
 
-#: Expression for the time of a lattice after a number of steps. It counts from the last change of h, so that rounding
-#: errors do not accumulate.
+#: Expression for the time of a lattice after a number of steps. The time is counted from the last change of h, so that
+#: rounding errors do not accumulate.
 LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
 
 TIME = Choice(

@@ -60,8 +60,8 @@ def _of_fixed(program: Program) -> dict[str, object]:
 def _of_gauge(program: Program) -> str:
     """Return what docstrings say about the gauge.
 
-    A second sentence says that a step is a Poisson map. It is left out for systems with forces, and for Gauss steps
-    that preserve the structure only up to the truncation error.
+    A second sentence says that a step is a Poisson map. The second sentence is left out for systems with forces, and
+    for Gauss steps that preserve the structure only up to the truncation error.
     """
     said = _OF_LEVEL if program.monitor else _OF_GAUGE
     return said.partition(".")[0] + "." if program.truncated or program.forced else said

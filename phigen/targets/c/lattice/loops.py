@@ -70,8 +70,8 @@ def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
 
 
 def share(densities: Kernel) -> int:
-    """Return the number of sites for which the densities of observables are computed in one pass. It is limited by the
-    size of the buffer.
+    """Return the number of sites for which the densities of observables are computed in one pass. The number is limited
+    by the size of the buffer.
     """
     return max(1, _BUFFER // len(densities.roots))
 
