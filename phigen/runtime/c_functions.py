@@ -21,8 +21,8 @@ _SIGNATURES = {
 }
 
 
-# Signatures for a Hamiltonian that depends on the time: the time is an additional argument. Each replaces the signature
-# of the same name in `_SIGNATURES`.
+# Signatures for a Hamiltonian that depends on the time: the time is an additional argument. All but ``init_at`` replace
+# the signatures of the same names in `_SIGNATURES`.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),

@@ -427,8 +427,8 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return [list of the times ``t``], or [] if ``t`` is None: the sequences that a call of C gets besides the
-    states."""
+    """Return [times ``t`` as a list], or [] if ``t`` is None, so that callers can combine it with other sequences by
+    ``zip``."""
     return [] if t is None else [t.tolist()]
 
 

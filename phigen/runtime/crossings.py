@@ -196,8 +196,8 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings (t, x) in the latest block of steps, without its first ``searched`` intervals, which were
-        searched before.
+        """Yield the crossings (t, x) in the latest block of steps. Its first ``searched`` intervals are left out, since
+        they were searched before.
         """
         self.places = []
         for sign in SIGNS[self.direction]:
@@ -303,7 +303,8 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """Return the crossing between two fractions of interval j: its number of steps, and a session there.
+        """Return the crossing between two fractions of interval j: the number of steps before the crossing, and a
+        session at the crossing.
 
         Interval j lies between points j and j + 1. ``at_low`` and ``at_high`` are the values of g at the fractions
         ``low`` and ``high``.

@@ -85,7 +85,7 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
 
 
 def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
-    """Return the times at which rows are requested, without repetitions, ascending or, for a negative step, descending.
+    """Return the times at which rows are requested, in the order of the run and without repetitions.
 
     Raises `ValueError` if there are no times, or if a time is before the start or, with ``known_end``, after the end.
     """

@@ -440,9 +440,9 @@ class Solver(Named[Backend, Interface]):
         An attitude is a quaternion (4,) or a matrix (n, n). A position is an array (3,). If the spec has no positions,
         the third result is None. Arrays of attitudes and positions have the leading axes of x: (members, …), with a
         ``stride`` (rows, members, …). ``attitude0`` and ``position0`` are initial values, one for all members or
-        (members, …), by default the identity and the origin. Each member has the same bits as in `integrate`. Raises
-        the errors of `ensemble`, with all three results in ``trajectory``, and `TypeError` if the spec does not say
-        ``reconstruct``.
+        (members, …), by default the identity and the origin. The results of each member have the bits that `integrate`
+        returns for this member. Raises the errors of `ensemble`, with all three results in ``trajectory``, and
+        `TypeError` if the spec does not say ``reconstruct``.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         requested = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)
