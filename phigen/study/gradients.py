@@ -111,7 +111,7 @@ def of_lattice(
     """Return the run of a lattice from ``x`` (coordinates, *sizes).
 
     The run has `STEPS` steps. The step size is h, or smaller if the run fails with h. ``units`` are typical magnitudes
-    of the numbers of ``x``, in one dimension.
+    of the numbers of ``x``, as a one-dimensional array.
     """
     arguments: dict[str, Any] = {"t0": t0}
     h = possible_step(lambda size: solver.integrate(x, size, STEPS, STRIDE, parameters=parameters, **arguments), h)
@@ -139,9 +139,9 @@ def measured(
     """Yield the results of two checks of gradients: against tangent maps, and against finite differences.
 
     In systems with a monitor, the equations contain the energy level e = −H(x₀). The first check needs runs in which e
-    is fixed (``fixed_level_runs``), since tangent maps hold e fixed. For the second check, gradients of
-    ``free_level_runs`` include the dependence of e on initial state and parameters. ``place`` is added to the names of
-    the checks.
+    is fixed (``fixed_level_runs``), since tangent maps hold e fixed. The second check needs ``free_level_runs``, whose
+    gradients include the dependence of e on initial state and parameters. ``place`` is added to the names of the
+    checks.
     """
     apart, failure = _largest(fixed_level_runs, transposition_error)
     reason = failure or f"the gradient differs from the transpose of the tangent maps by {apart:.1e}"

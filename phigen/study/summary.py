@@ -142,7 +142,7 @@ class Watch:
         self.state["broken"] = np.asarray(True)
 
     def see(self, t: Floats, x: Floats) -> None:
-        """Receive the next rows, times (rows,) and states (rows, DIM).
+        """Receive the times (rows,) and the states (rows, DIM) of the next rows.
 
         The first non-finite row and all rows after it are ignored.
         """
