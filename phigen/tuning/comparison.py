@@ -41,7 +41,7 @@ Notify = Callable[[str], object]
 
 @dataclass(frozen=True)
 class ComparedMethod:
-    """Results of one method of a comparison. If there are none, ``refusal`` is the reason, else "".
+    """Results of one method of a comparison. If there are no results, ``refusal`` is the reason, else "".
 
     ``error`` and ``casimirs`` are the largest errors of energy and Casimirs along the run. ``orbit`` is the largest
     distance from the reference solution. ``defect`` is the residual of DΦ π DΦᵀ = π∘Φ. Unknown results are None.

@@ -141,7 +141,8 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
-    """Yield (1 + Σ 1/b)^exponent. The sum is over the first of the ``bases`` b, as many as `MOST_LETTERS` allows.
+    """Yield (1 + Σ 1/b)^exponent. The sum is over the first n ``bases`` b, where n is as large as `MOST_LETTERS`
+    allows.
 
     Nothing is yielded if fewer than two bases fit.
     """

@@ -28,8 +28,8 @@ CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: FINALISTS: number of best methods whose steps are confirmed and timed. BEHIND: largest cost of these methods, as a
 #: multiple of the least cost. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Longer runs that test methods begin only before this share of the time budget is used up. If no method has passed the
-#: test by then, further methods are tested, with one step size each, until one passes.
+#: Share of the time budget for longer runs that test methods. If no method has passed the test when the share is used
+#: up, further methods are tested, with one step size each, until one passes.
 CONFIRMED = 1.0
 #: Multiple of the time budget after which no further round of timings begins. A round takes about a tenth of the
 #: budget.
