@@ -14,7 +14,7 @@ from types import FrameType
 
 CODE = 130
 
-#: Whether Ctrl-C raises `KeyboardInterrupt`: a command is running, which must clean up after Ctrl-C.
+#: Whether a command is running. If so, Ctrl-C raises `KeyboardInterrupt`, so that the command can clean up.
 working = False
 
 

@@ -130,7 +130,7 @@ def command(
 
 
 def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:
-    """Return the sweep of that name, by default the first. Raises `SpecError` if the spec has no sweeps."""
+    """Return the sweep called ``name``, by default the first. Raises `SpecError` if the spec has no sweeps."""
     from phigen.errors import Diagnostic, SpecError
 
     if not spec.sweeps:

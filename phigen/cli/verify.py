@@ -144,7 +144,7 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
 def verified(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """Verify a compilation that has the tangent map of a step, on a run of its spec.
+    """Verify a compilation on a run of its spec. The compilation must have the tangent map of a step.
 
     ``targets`` are by default those of the spec; targets that Python cannot run are left out. Only whole steps are
     made, at least one. If the last step of the run is shorter, it is left out.

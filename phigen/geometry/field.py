@@ -93,8 +93,7 @@ class Field(Arithmetic[Scalar]):
         return rational if self.is_rational else Ratio(self._context.constant(rational), self._context.constant(1))
 
     def convert(self, e: Expression) -> Scalar:
-        """Return an expression as an element of the field. Raises `KeyError` if the expression contains foreign
-        symbols."""
+        """Return an expression as an element of the field. Raises `KeyError` for a symbol that the field lacks."""
         if e.is_number:
             return self.number(e.value)
         return self.values([e])[0]

@@ -12,9 +12,10 @@ from phigen.symbolic.verdict import Statement, decide_elements
 
 
 def jacobi_identity(system: System) -> Statement:
-    """Decide Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k, with parameters as symbols.
+    """Decide whether Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k.
 
-    If the identity is refuted, the statement names the first triple i, j, k, with a point where the sum is not 0.
+    The parameters are symbols. If the identity is refuted, the statement names the first triple i, j, k, with a point
+    where the sum is not 0.
     """
     names = system.coordinates
     entries = [e for row in system.poisson for e in row]

@@ -1,7 +1,7 @@
 """Faithful matrix representations of Lie algebras, found from the structure constants.
 
-Each indecomposable part of an algebra gets a representation of its own. It is the first one in this list that is
-faithful and accepted by the caller:
+Each indecomposable part of an algebra gets a representation of its own: the first one in this list that is faithful and
+accepted by the caller.
 
 - the defining matrices of a named family with the same structure constants, or with the negated ones
 - the adjoint representation, if the centre is 0

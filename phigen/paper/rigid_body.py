@@ -28,7 +28,7 @@ SPEC, RUN = "rigid_body_paper", "paper"
 #: LONG: number of steps of the long run. EARLY: number of steps of shorter runs, which are measured too.
 #: ROWS: number of rows that each run stores.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
-#: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
+#: Labels of curves. PHI is the method PHI-2 of the paper: the Cayley bi-realisation at order 2.
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
 #: Step size and number of steps of the run for the Poincaré section. With this step size RK4 drifts visibly.
 COARSE, SECTION_STEPS = 0.004, 75_000

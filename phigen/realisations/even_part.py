@@ -78,8 +78,8 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
     span it.
 
     Each basis element that has nonzero brackets is in one of the ideals. All other basis elements are left out, since
-    M_p x has no component along them. Ideals may share central elements, such as the last one of a central
-    extension.
+    M_p x has no component along them. Ideals may share central elements, such as the element that a central
+    extension adds.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}

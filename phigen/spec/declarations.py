@@ -403,7 +403,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter with values at sites if there is no lattice, or at bonds if the lattice has no graph.
+    """Report a parameter at sites if there is no lattice, and a parameter at bonds if the lattice has no graph.
 
     ``domain`` is ``sites``, ``bonds`` or ``all``.
     """

@@ -65,7 +65,7 @@ def decide_zero(
     """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its verdict.
 
     ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the part in a refutation.
-    ``positive`` are the symbols that take positive values only. ``detail`` is the detail of the statement if proved.
+    ``positive`` are the symbols that take positive values only. ``detail`` is the detail of a proved statement.
     """
     nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:
@@ -163,7 +163,7 @@ def _value(expression: Expression, point: dict[str, Fraction]) -> str:
 
 
 def sample_point(names: Sequence[str], positive: Collection[str], index: int) -> dict[str, Fraction]:
-    """Return a rational point: number ``index`` of a fixed sequence. Its coordinates have magnitudes between
+    """Return point number ``index`` of a fixed sequence of rational points. Coordinates have magnitudes between
     1/5 and 3.
 
     A coordinate may be negative if the index is odd and the name is not in ``positive``. The sequence depends on the
