@@ -129,7 +129,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
     """Return one line for the header of generated files: which sizes do not fit the colours of sites, and which sizes
-    would.
+    near them fit.
 
     ``colours`` is the number of colours of the splitting. The result is "" if there are no ``wrong_sizes``.
     """
@@ -141,8 +141,8 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
     """Return one line for the header of generated files. It names all sizes that need a boundary seam.
 
-    A seam is needed if a size is not a multiple of the period of the colours. For each size, the line also names a
-    multiple near the size.
+    A seam is needed if a size is not a multiple of the period of the colours. For each size, the line also has a
+    multiple of the period near the size.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"

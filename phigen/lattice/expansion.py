@@ -123,7 +123,7 @@ class Expansion:
 
     def casimirs(self) -> dict[str, Expression]:
         """Return the Casimirs by name. The cell states a Casimir by a density. The Casimir is the sum or the product of
-        the density over all sites, or each site has a Casimir.
+        the density over all sites, or the density at each site is a Casimir.
         """
         casimirs: dict[str, Expression] = {}
         plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)

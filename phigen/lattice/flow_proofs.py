@@ -2,8 +2,8 @@
 
 Two kinds of statements are proved. First, the parts of H sum to H, and the parts of the forces sum to πζ + f, with the
 covector force ζ and the vector force f. Second, the flow of each part solves its equation of motion at a site. In this
-equation, the gradient of the part and the values at neighbours count as constants. This is correct since the
-coordinates that a part depends on commute over the whole lattice.
+equation, the gradient of the part and the values at neighbours count as constants. The gradient and these values are
+constant along the flow, since all coordinates of a part commute over the whole lattice.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     and pairs.
 
     Where the density reaches beyond an open end, the value of the density must not become the maximum or minimum over
-    the sites. There, minus or plus the largest number is used in its place.
+    the sites. There, the result is −L for a maximum and L for a minimum, where L is the largest floating-point number.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":

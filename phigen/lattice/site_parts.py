@@ -159,7 +159,7 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    The flow of a term of H updates sites up to the distance ``near`` (a field of the seam) from the site where the term
+    The flow of a term of H updates sites up to the distance ``near`` (a member of `Seam`) from the site where the term
     begins. If the value of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no
     sites beyond this distance. Otherwise a seam must be wider.
     """
