@@ -77,7 +77,7 @@ class Flow:
 
     @property
     def has_motion(self) -> bool:
-        """Whether the flow, or one of its pieces, is a Kepler motion or that of a free rigid body."""
+        """Whether the flow, or one of its pieces, is a Kepler motion or the motion of a free rigid body."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
