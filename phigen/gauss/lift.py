@@ -1,4 +1,4 @@
-"""Frames of group elements. With them, momenta are quadratic forms with constant coefficients.
+"""Frames: quaternions with which momenta are quadratic forms with constant coefficients.
 
 Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra (an associative algebra with an involution
 *). On this copy, the functional x̃ of `phigen.gauss.star_algebra` is x̃(q) = y·Im q with a vector y. There is a
