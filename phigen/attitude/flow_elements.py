@@ -6,9 +6,9 @@ exp(t∇R), times the rotation by C. The rotation by C does not change x, and th
 to h. So the rotation by C is applied once in a step.
 
 With forces, a monitor, or a time in H, the rotation by C is not uniform. Then the element of each flow has a factor for
-C. If the Hamiltonian of a noise source contains a Casimir, the element of the flow of this source has a factor for it.
-If a flow is composed of commuting flows, its element is the product of their elements. Elements of free rigid bodies
-are in `phigen.attitude.free_bodies`.
+C. If the Hamiltonian of a noise source contains a Casimir, the group element for this source has a factor for the
+Casimir. If a flow is composed of commuting flows, its element is the product of their elements. Elements of free rigid
+bodies are in `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
@@ -192,9 +192,10 @@ def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expres
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
-    """Decide for all summands in ``turning.factors`` whether their gradients are constant along the necessary flows.
+    """Return the statement that the gradient of each summand is constant along its flow and the flows of the summands
+    before it.
 
-    The gradient of a summand must be constant along the flows of this summand and of all summands before it.
+    The summands are those in ``turning.factors``, in this order.
     """
     names, residuals = system.coordinates, list[tuple[str, Expression]]()
     fields = [hamiltonian_vector_field(system.poisson, gradient(f, names)) for f in turning.factors]

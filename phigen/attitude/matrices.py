@@ -6,8 +6,8 @@ of exp, are combinations of 1, P, …, P^{N−1}. The scalar factors of these co
 P², …, P^{N−1} takes N − 2 products of matrices. Up to signs, the q_j are the elementary symmetric functions of the
 eigenvalues. Newton's identities give them from the traces of powers of P.
 
-In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) = 1 +
-sin(√s)/√s P + (1 − cos √s)/s P², for any s.
+In flows of a splitting, most P generate a rotation in a plane, or a shift. Then P³ = −sP with a number s, and exp(P) =
+1 + sin(√s)/√s P + (1 − cos √s)/s P².
 """
 
 from __future__ import annotations
