@@ -152,8 +152,9 @@ class Evaluation:
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
             # "rest" adds an error for the omitted terms of a Taylor series. The C may omit the terms a[3:], and omits
-            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2], where tail is the first later term. The
-            # factors 3 and 2 cover all other terms; omitted terms are divided by at least a[2].
+            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound for the coefficient
+            # of the order of a[3], on a box that contains the path: by Lagrange's form of the remainder, it bounds the
+            # sum of all terms from a[3] on. The divisor of these terms is at least a[2].
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
