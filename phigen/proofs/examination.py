@@ -90,7 +90,7 @@ def refutation(examination: Examination) -> str:
 
 
 def hint_of(spec: Spec, group: str) -> str:
-    """Return a hint at the usual cause if a statement of this group is refuted, or "".
+    """Return a hint at the usual cause of a refuted statement of the ``group``; "" if phigen has no hint.
 
     If a function is no Casimir, the coordinates may be in another order than the basis of the named algebra.
     """
