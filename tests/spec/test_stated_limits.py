@@ -31,7 +31,7 @@ ROWS = {
     "CORRECTIONS": "corrections of the modified Hamiltonian",
     "OPERATIONS": "operations of one function of the generated code",
     "PRODUCT_TERMS": "terms of a product of polynomials",
-    "PRODUCT_BYTES": "memory of such a product, or of a gradient, in bytes",
+    "PRODUCT_BYTES": "memory of a product of polynomials, or of a gradient, in bytes",
     "TAYLOR_BYTES": "memory of all products and sums of a series, in bytes",
     "SERIES_TERMS": "terms of one S_i",
     "CELLS": "exponents of all monomials of one S_h, and of its derivatives",
