@@ -191,7 +191,7 @@ def _refusal(c: dict[str, Any], domain: Box, failure: Exception, box_count: int)
     box = ", ".join(f"{n} in [{a:.6g}, {b:.6g}]" for n, (a, b) in zip(names, domain, strict=True) if (a, b) != (0, 0))
     reason = "a matrix may be singular" if isinstance(failure, ZeroDivisionError) else str(failure)
     message = f"no certificate after {box_count} boxes: {reason}, for {box}"
-    return NoCertificateError(message, "a smaller box, a smaller step, or more boxes by --boxes")
+    return NoCertificateError(message, "take a smaller box, a smaller step, or more boxes by --boxes")
 
 
 def _widest(domain: Box) -> int | None:

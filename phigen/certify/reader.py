@@ -392,7 +392,7 @@ def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: li
         if kind == "call":
             called.append([about[0], _integer_value(about[1], names) // names["ROW"]])
             if len(called) > MOST_FLOWS:
-                raise RefusedError(f"the C has more than {MOST_FLOWS} flows in a step")
+                raise RefusedError(f"a step of the C has more than {MOST_FLOWS} flows, the limit of certificates")
         elif kind == "advance":
             names["coef"] += _integer_value(about, names)
         else:
@@ -432,7 +432,7 @@ def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:
-        raise RefusedError(f"function flow{flow} of the C does more than add increments to the state")
+        raise RefusedError(f"function flow{flow} of the C has statements that certificates do not cover")
     return [[int(i), int(j)] for i, j in changes]
 
 

@@ -74,7 +74,7 @@ class ExactMap:
             u = [arb((v - d).mid()) for v, d in zip(u, delta, strict=True)]
             if all(abs(d.mid()) < SOLVED for d in delta):
                 return u
-        raise RuntimeError(f"the equation of the exact map is not solved at {[float(v) for v in x]}")
+        raise RuntimeError(f"Newton's method does not solve the equation of the exact map at {[float(v) for v in x]}")
 
 
 def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:

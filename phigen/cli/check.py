@@ -115,7 +115,7 @@ def _compared(
     if compilation is None:
         return []
     if not compilation.has_series:
-        console.warn(f"{examination.spec.file}: {compilation.label} has no S_i to derive a second time")
+        console.warn(f"{examination.spec.file}: {compilation.label} has no series to derive a second time")
         return []
     if shown:
         out("  Second derivation, by sympy alone")

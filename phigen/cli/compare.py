@@ -101,7 +101,7 @@ def _expect_comparable(spec: Spec) -> None:
     for key, is_present in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
         if is_present:
             place = ("damping",) if key == "forces" and ("damping",) in spec.locations else (key,)
-            message = f"phigen compare is for systems whose energy is conserved, and {place[0]} changes it"
+            message = f"phigen compare needs a system that conserves its energy, and {place[0]} changes the energy"
             raise SpecError([spec.diagnostic(place, message, "phigen verify and phigen run measure one setting")])
 
 
@@ -125,7 +125,7 @@ def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
     refused = [entry for entry in comparison.entries if entry.refusal]
     for reason in dict.fromkeys(entry.refusal for entry in refused):
         titles = "; ".join(entry.title for entry in refused if entry.refusal == reason)
-        hint = "; a larger --budget builds them" * (reason == LATE)
+        hint = "; try a larger --budget" * (reason == LATE)
         out(f"  Not measured, since {reason}{hint}: {titles}.")
 
 

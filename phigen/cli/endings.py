@@ -153,8 +153,8 @@ def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[flo
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h
         if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):
-            message = f"with noise, states are known only after whole steps of {abs(experiment.h)!r}; the time"
-            raise click.BadParameter(f"{message} {time!r} is inside a step", param_hint=option)
+            message = f"the time {time!r} is inside a step; with noise, states are known only after whole steps of"
+            raise click.BadParameter(f"{message} {abs(experiment.h)!r}", param_hint=option)
 
 
 def _parse_times(at: Sequence[str]) -> list[float]:

@@ -91,7 +91,8 @@ def sweep_warning(count: int, members: int, largest: float, h: float, order: int
     if not count:
         return ""
     warning = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
-    hint = f"a smaller step for these members; the estimate for the worst is {advised_step(largest, h, order):g}"
+    step = f"{advised_step(largest, h, order):g}"
+    hint = f"take a smaller step for these members; for the member with the largest error, about {step}"
     return f"{warning}; the largest is {_multiple(largest)} the energy: do not trust their numbers\n  hint: {hint}"
 
 

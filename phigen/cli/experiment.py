@@ -201,7 +201,7 @@ def _expect_few(steps: float | Fraction, option: str) -> None:
     """Raise `LimitError` for more steps than a spec may have."""
     if steps > limits.STEPS:
         message = f"{option}: {float(steps):.9g} steps, more than the limit of {limits.STEPS}"
-        raise LimitError([Diagnostic(message, hint="fewer or larger steps")])
+        raise LimitError([Diagnostic(message, hint="take fewer or larger steps")])
 
 
 def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:

@@ -79,7 +79,7 @@ def report(error: BaseException, console: Console) -> int:
             console.error(f"error: {location + ': ' if location else ''}{error.strerror}")
             return USAGE
         case MemoryError():
-            console.error("error: out of memory\n  hint: fewer sites, members, or states that are stored at a time")
+            console.error("error: out of memory\n  hint: take fewer sites or members, or store fewer states")
             return LimitError.exit_code
     return _internal(error, console)
 

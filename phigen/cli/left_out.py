@@ -33,7 +33,7 @@ def names_left_out(directory: Path) -> dict[str, Location]:
         name = line.split("#", 1)[0].strip()
         place = Location(number, line.find(name) + 1, str(path))
         if name and not SPEC_NAME.fullmatch(name):
-            errors.append(Diagnostic(f"{name!r} is not the name of a spec", place, "one name a line", line))
+            errors.append(Diagnostic(f"{name!r} is not the name of a spec", place, "write one name in each line", line))
         elif name in names:
             errors.append(Diagnostic(f"{name} is in line {names[name].line} already", place, "", line))
         elif name:

@@ -167,7 +167,7 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     names = solver.interface
     if experiment.run.record:
         message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"
-        raise click.UsageError(f"--extend: {message}; --from starts at a file with the state")
+        raise click.UsageError(f"--extend: {message}; --from continues from a file that has the state")
     stored = past_of(path, names, "--extend")
     expected = [name for column in columns_of(names) for name in column.names]
     state = names.dimension + 1 + names.monitored

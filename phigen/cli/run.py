@@ -179,7 +179,7 @@ def command(
     for file in (output, section):
         if file:
             mark(file, origin)
-            console.note(f"{wrote(file)}" + (", as far as the run came" if failure or interrupted else ""))
+            console.note(f"{wrote(file)}" + (", up to the last computed state" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
     comparable = not (failure or interrupted or extend)
     for method in experiment.run.compare if comparable else ():

@@ -89,7 +89,7 @@ def command(
     clock = TimeBudget(budget)
     spec = load_one(spec_file)
     if spec.noise:
-        message = "phigen tune does not compare settings where there is noise"
+        message = "phigen tune does not compare settings for systems with noise"
         raise SpecError(
             [
                 spec.diagnostic(
@@ -100,7 +100,7 @@ def command(
             ]
         )
     if spec.time:
-        message = "phigen tune does not compare settings where H depends on the time"
+        message = "phigen tune does not compare settings for systems whose H depends on the time"
         raise SpecError(
             [
                 spec.diagnostic(
@@ -209,9 +209,7 @@ def _of_lattice(
             f"measured on {reduced_text} instead of {full_text} sites; times grow in proportion to the number of sites"
         )
     if measure == "orbit" and len(problem.start) > MOST_COMPARED:
-        message = (
-            f"orbits are compared for states of up to {MOST_COMPARED} numbers, and this one has {len(problem.start)}"
-        )
+        message = f"a state of this run has {len(problem.start)} numbers; orbits are compared up to {MOST_COMPARED}"
         raise SpecError(
             [compilation.spec.diagnostic(("runs", run.name), message, "use --measure energy, or smaller sizes")]
         )

@@ -244,11 +244,11 @@ def unreached(tuning: Tuning) -> str:
     if point.rounding > tuning.accuracy or any(at_floor(c.points) for c in tuning.curves if c.setting):
         single = point.unit == SINGLE_ROUNDING
         explanation = "smaller steps do not help: the remaining error is rounding" + " in single precision" * single
-        options = ["ask for less accuracy", "a shorter --horizon"][: 1 + (point.error > 2 * point.measured)]
+        options = ["ask for less accuracy", "take a shorter --horizon"][: 1 + (point.error > 2 * point.measured)]
         hint = " or ".join([*options, *["set real: double"] * single])
     else:
         explanation = "smaller steps would take longer than the budget allows"
-        hint = "a larger --budget, or less accuracy"
+        hint = "take a larger --budget, or ask for less accuracy"
     return (
         f"no setting reaches {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.6g}: the smallest error is "
         f"{point.error:.1e} ({title}, step {point.step:.3g}); {explanation}\n  hint: {hint}"

@@ -173,8 +173,8 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
     apart = np.abs(t[nearest] - requested_times)
     if (apart > 1e-9 * np.ptp(t)).any():
         earliest_between = float(requested_times[int(np.argmax(apart))])
-        message = f"with noise only stored states can be returned: the time {earliest_between!r} is between two of them"
-        raise ValueError(f"{message}, where the path is not known; stride=1 stores all steps")
+        message = f"the time {earliest_between!r} is between two stored states"
+        raise ValueError(f"{message}, where the path of the noise is not known; stride=1 stores all states")
     rows: Floats = x[nearest]
     return rows
 

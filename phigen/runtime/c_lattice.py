@@ -352,7 +352,7 @@ class CLatticeSession:
     @staticmethod
     def _expect_done(status: int) -> None:
         if status:
-            raise ValueError(f"there is no such stage, plane or step: {status_name(status)}")
+            raise ValueError(f"the stage, the planes or the step do not exist: {status_name(status)}")
 
     def _filled(self, function: Any, shape: tuple[int, ...]) -> Floats:
         result = np.empty(shape, self._real)

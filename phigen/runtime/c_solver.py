@@ -96,7 +96,9 @@ class CSolver:
         ``parameters`` is not used, since the bytes contain the parameters.
         """
         if len(saved) != self._c.solver_size():
-            raise ValueError(f"{len(saved)} bytes are not a {self.interface.name}_solver of this library")
+            raise ValueError(
+                f"the saved session has {len(saved)} bytes, those of this solver have {self._c.solver_size()}"
+            )
         struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 

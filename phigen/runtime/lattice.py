@@ -708,7 +708,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         `series`."""
         recordable_names = recordable(self.interface)
         if strange := [name for name in of if name not in recordable_names]:
-            raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(recordable_names)}")
+            raise ValueError(f"{strange[0]!r} cannot be recorded; there are {', '.join(recordable_names)}")
         target = expect_table(output) if output else None
         rows, met = NumberRows(self.interface, of), NumberRows(self.interface, of)
         identity = {"record": list(of)}
@@ -1164,7 +1164,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
 def missing_bonds() -> TypeError:
     """Return the error for a graph that is integrated without ``bonds``."""
-    return TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
+    return TypeError("bonds= is missing: a lattice that is a graph needs an array (bonds, 2) of site numbers")
 
 
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
@@ -1184,7 +1184,7 @@ def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
     if len(wrong_bonds):
         a, b = pairs[wrong_bonds[0]].tolist()
         raise ValueError(
-            f"bond {wrong_bonds[0]} runs from {a} to {b}, not between two different sites from 0 to {sites - 1}"
+            f"bond {wrong_bonds[0]} runs from {a} to {b}, but must join two different sites from 0 to {sites - 1}"
         )
     return integers
 

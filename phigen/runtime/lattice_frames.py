@@ -231,7 +231,7 @@ def expect_columns(shape: tuple[int, ...]) -> None:
     columns."""
     if (count := int(np.prod(shape))) > MAX_COLUMNS:
         message = f"a .csv of states would have {count} columns, more than {MAX_COLUMNS}"
-        raise ValueError(f"{message}; frames go to .npz, and record: [energy, …] makes few columns")
+        raise ValueError(f"{message}; write states to .npz, or choose few columns by record: [energy, …]")
 
 
 def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, ...]:

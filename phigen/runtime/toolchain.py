@@ -44,8 +44,8 @@ _CANDIDATES = ("cc", "gcc", "clang")
 #: compiles its runtime.
 _PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
 _HINT = (
-    "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
-    "environment variable CC; the numpy target needs none"
+    "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name a compiler in the "
+    "environment variable CC; the target numpy needs no compiler"
 )
 _MESSAGE_LINES = 8
 _MESSAGE_BYTES = 1 << 16

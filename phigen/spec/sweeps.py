@@ -219,7 +219,7 @@ def _expect_sense(
         _fail((*place, "frames"), message, declared)
     if "crossings" in sweep.keep and declared.lattice:
         hint = "keep observables: M, mean(M), std(M)"
-        _fail((*place, "keep"), "crossings: sweeps of lattices cannot keep them", declared, hint)
+        _fail((*place, "keep"), "crossings: not available in sweeps of lattices", declared, hint)
     elif "crossings" in sweep.keep and run is not None and run.section is None:
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)

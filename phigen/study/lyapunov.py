@@ -115,7 +115,7 @@ class FrameGrowth:
     def spectrum(self) -> Spectrum:
         """Return the exponents so far. Raises `ValueError` if no step was made."""
         if not self.state["steps"]:
-            raise ValueError("there are no exponents without a step")
+            raise ValueError("Lyapunov exponents need at least one step")
         times, history = self._noted()
         order = np.argsort(-history[-1], kind="stable")
         return Spectrum(history[-1][order], times, history[:, order])

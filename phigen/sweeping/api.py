@@ -182,9 +182,9 @@ def _sweep_of(
     strange = [what for what in sweep.keep if what not in KEPT and Statistic.read(what, spec.recorded) is None]
     if strange:
         known = ", ".join([*KEPT, *spec.recorded, *(f"{of}({n})" for n in spec.recorded for of in STATISTICS)])
-        raise ValueError(f"cannot keep {strange[0]!r}; there are {known}")
+        raise ValueError(f"{strange[0]!r} cannot be kept; there are {known}")
     if "crossings" in sweep.keep and spec.lattice:
-        raise ValueError("crossings: sweeps of lattices cannot keep them; keep observables: M, mean(M), std(M)")
+        raise ValueError("crossings: not available in sweeps of lattices; keep observables: M, mean(M), std(M)")
     if "crossings" in sweep.keep and run.section is None:
         raise ValueError(f"crossings: the run {run.name} has no section")
     if "energy_error" in sweep.keep and spec.time:
@@ -259,5 +259,5 @@ def _range(name: str, value: Mapping[str, Any]) -> Axis:
     if scale not in ("linear", "log"):
         raise ValueError(f"over: {name}: scale must be linear or log, not {scale!r}")
     if scale == "log" and min(first, last) <= 0:
-        raise ValueError(f"over: {name} on a logarithmic scale reaches {min(first, last):g}")
+        raise ValueError(f"over: {name} must be positive on a logarithmic scale, not {min(first, last):g}")
     return Axis(name, (), (first, last), count, scale)

@@ -151,7 +151,7 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> No
     """Raise `SpecError` if a varied quantity has the name of another array of the store, such as ``status``."""
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.stored):
-            message = f"{spec.file}: a sweep over {name!r}, which is the name of another array in its store"
+            message = f"{spec.file}: {name!r} is also the name of another array in the store of the sweep"
             raise SpecError([Diagnostic(message, hint="choose another name for it in the spec")])
 
 

@@ -70,7 +70,7 @@ runs: {a: {initial: [0.1, 0.2], step: 0.1, steps: 10, box: BOX}}
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["pendulum", "--step", "30", "--boxes", "2"], 5, "hint: a smaller box"),
+        (["pendulum", "--step", "30", "--boxes", "2"], 5, "hint: take a smaller box"),
         (["double_well"], 1, "certificates do not cover noise"),
         (["heisenberg"], 1, "is a lattice"),
         (["pendulum", "--box", "r=0:1"], 2, "'r' is not a coordinate; there are q, p"),

@@ -63,7 +63,7 @@ def test_table_marks_the_setting_of_the_spec(phigen, body):
     result = phigen("compare", body, "--orders", "4", "--budget", "0.01", "-q")
     assert result.exit_code == 0, result.stderr
     assert "exponential, order 4 *" in result.stdout
-    assert "Not measured, since there was no time to build it; a larger --budget builds them: " in result.stdout
+    assert "Not measured, since there was no time to build it; try a larger --budget: " in result.stdout
     assert result.stderr == ""
 
 
@@ -81,10 +81,10 @@ def test_lattices_are_compared_too(phigen, in_tmp):
     [
         (
             "noise: {kick: {hamiltonian: a}}",
-            "phigen compare is for systems whose energy is conserved, and noise changes it",
+            "phigen compare needs a system that conserves its energy, and noise changes the energy",
         ),
-        ("damping: k", "phigen compare is for systems whose energy is conserved, and damping changes it"),
-        ("time: t", "phigen compare is for systems whose energy is conserved, and time changes it"),
+        ("damping: k", "phigen compare needs a system that conserves its energy, and damping changes the energy"),
+        ("time: t", "phigen compare needs a system that conserves its energy, and time changes the energy"),
     ],
 )
 def test_open_systems_are_refused_at_their_place(phigen, body, line, message):

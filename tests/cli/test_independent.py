@@ -61,7 +61,7 @@ def test_a_splitting_has_nothing_to_compare(phigen, write):
     write("a.yaml")
     result = phigen("check", "--independent", "--scheme", "splitting", "a.yaml")
     assert result.exit_code == 0
-    assert "a.yaml: splitting has no S_i" in result.stderr
+    assert "a.yaml: splitting has no series" in result.stderr
 
 
 @pytest.mark.parametrize("options", [["--terms", "3"], ["--seconds", "3"], ["--independent", "--terms", "99"]])

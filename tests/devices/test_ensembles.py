@@ -270,7 +270,8 @@ def test_steps_that_a_card_runs_slowly_are_warned_of(body, x0, monkeypatch):
     monkeypatch.setattr(again.device, "is_card", True)
     monkeypatch.setattr(again.device, "local_bytes", lambda kernel: 880)
     with pytest.warns(
-        PhigenWarning, match=r"t: besides registers, each member uses 880 bytes of .*; members with the same"
+        PhigenWarning,
+        match=r"t: each member uses 880 bytes of .* besides registers, which is slow; give all members the same",
     ):
         again.ensemble(x0, 0.1, 1)
 

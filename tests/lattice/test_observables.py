@@ -314,7 +314,7 @@ def test_series_go_on_from_their_checkpoint(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="an interrupted run: continue"):
         solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=checkpoint, resume=False)
     with pytest.raises(
-        ValueError, match="cannot record 'e'; there are energy, flow, oriented, tightest, steepest, P, hot"
+        ValueError, match="'e' cannot be recorded; there are energy, flow, oriented, tightest, steepest, P, hot"
     ):
         solver.series(x0, 0.05, 12, of=["e"], bonds=bonds)
     resumed = solver.series(x0, 0.05, 12, 2, of=["P", "hot"], bonds=bonds, checkpoints=checkpoint)

@@ -658,7 +658,7 @@ def test_a_start_where_h_is_not_defined_is_said_with_its_site() -> None:
         (np.full((3, 7), np.nan), {}, ValueError, "finite"),
         (np.zeros((3, 7)), {"B": np.zeros(6)}, ValueError, r"shape \(7,\)"),
         (np.zeros((3, 7)), {"K": 1.0}, TypeError, "unknown parameter"),
-        (np.zeros((1, 7)), {}, TypeError, "needs its bonds="),
+        (np.zeros((1, 7)), {}, TypeError, "bonds= is missing"),
         (np.zeros((1, 3)), {"bonds": BONDS}, ValueError, r"bond 3 runs from 2 to 3, .* from 0 to 2"),
         (np.zeros((1, 7)), {"bonds": [[0, 1], [2, 2]]}, ValueError, "bond 1 runs from 2 to 2"),
         (np.zeros((1, 7)), {"bonds": BONDS, "A": np.ones(3)}, ValueError, r"shape \(7,\), not \(3,\)"),

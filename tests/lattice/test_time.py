@@ -167,7 +167,7 @@ def test_states_at_times_go_back_too_and_with_noise_are_frames() -> None:
     text = f'phigen: 1\nname: bath\nlattice: {{axes: [i]}}\n{SPINS}hamiltonian: "x*x[i+1]"\n{noise}\n'
     noisy = lattice_solver_of(compile_spec(specs.loads(text)), "numpy").integrate(x, 0.1, 4, 2, seed=1)
     np.testing.assert_array_equal(noisy.at([0.2, 0.0]), noisy.x[[1, 0]])
-    with pytest.raises(ValueError, match="with noise only stored states can be returned"):
+    with pytest.raises(ValueError, match="is between two stored states, where the path of the noise is not known"):
         noisy.at(0.1)
 
 

@@ -183,7 +183,7 @@ def test_forward_mode_of_lattices_is_refused_without_a_run():
 
 def test_a_propagator_of_a_graph_needs_bonds():
     graph = phigen.compile("food_web", target="numpy")
-    with pytest.raises(TypeError, match="needs its bonds="):
+    with pytest.raises(TypeError, match="bonds= is missing"):
         propagator(graph)
     with pytest.raises(ValueError, match="bond 0 runs from 0 to 7"):
         propagator(graph, bonds=[[0, 7]])(np.ones((1, 3)))

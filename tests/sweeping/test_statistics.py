@@ -103,7 +103,7 @@ def test_unknown_observables_are_refused():
     with pytest.raises(phigen.SpecError, match=r"keep: 'median\(kinetic\)' is not known"):
         phigen.spec.loads(DRIVEN.replace("mean(kinetic)", "median(kinetic)"))
     with pytest.raises(
-        ValueError, match=r"cannot keep 'mean\(q\)'; there are final, .*, kinetic, inside, mean\(kinetic\)"
+        ValueError, match=r"'mean\(q\)' cannot be kept; there are final, .*, kinetic, inside, mean\(kinetic\)"
     ):
         phigen.sweep(phigen.spec.loads(DRIVEN), keep=["mean(q)"])
 

@@ -217,7 +217,10 @@ def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, ov
         ({"over": {"I2": {"from": 1, "to": np.inf, "count": 3}}}, "I2: to must be finite"),
         ({"over": {"I2": {"from": 1, "to": 2, "count": -3}}}, "I2: count must be at least 1"),
         ({"over": {"I2": {"from": 1, "to": 2, "count": 3, "scale": "lgo"}}}, "linear or log"),
-        ({"over": {"I2": {"from": 0, "to": 2, "count": 3, "scale": "log"}}}, "logarithmic scale reaches 0"),
+        (
+            {"over": {"I2": {"from": 0, "to": 2, "count": 3, "scale": "log"}}},
+            "I2 must be positive on a logarithmic scale, not 0",
+        ),
         ({"over": {"I2": [1, 2j]}}, "I2 must be real"),
         ({"over": {"random": 5.0, "I2": {"from": 1, "to": 2}}}, "random must be an integer"),
         ({"over": {"random": 5, "seed": -1, "I2": {"from": 1, "to": 2}}}, "seed must be at least 0"),
@@ -613,7 +616,7 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
         phigen.sweep(specs.loads(CHAIN), over={"x": [1.0]})
     with pytest.raises(ValueError, match="needs a run of the spec"):
         phigen.sweep(specs.loads(CHAIN), initial=[1, 0, 0])
-    with pytest.raises(phigen.SpecError, match="crossings: sweeps of lattices cannot keep them"):
+    with pytest.raises(phigen.SpecError, match="crossings: not available in sweeps of lattices"):
         specs.loads(CHAIN.replace("keep: [final", "keep: [crossings"))
 
 

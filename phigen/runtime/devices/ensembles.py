@@ -103,7 +103,7 @@ class DeviceSolver:
             except OutOfMemoryError as error:
                 if batch == 1:
                     message = f"{self.device.name} has too little memory for one member: {error}"
-                    hint = f"close programs that use it, or set {CHOICE} to another device"
+                    hint = f"close programs that use the device, or set {CHOICE} to another device"
                     larger = "take a larger stride, " if members.stride else ""
                     raise self._failure(message, larger + hint, final, frames, members_done) from None
                 batch //= 2
@@ -201,8 +201,8 @@ class DeviceSolver:
         """Warn that steps are slow if the values of a member do not fit into the registers and the cache of the
         card."""
         if self.device.is_card and (size := self.device.local_bytes(kernel)) > _LOCAL_BYTES:
-            message = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
-            hint = "members with the same parameters and step need less, as do a lower order and scheme: splitting"
+            message = f"{self.interface.name}: each member uses {size} bytes of {self.device.name} besides registers"
+            hint = "give all members the same parameters and step, take a lower order, or scheme: splitting"
             warnings.warn(f"{message}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:

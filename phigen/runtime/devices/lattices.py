@@ -73,7 +73,7 @@ class DeviceLattice(NumpyLattice):
         rows += [launch.outputs for launch in launches.others.values()]
         largest = np.iinfo(np.int32).max // max(rows)
         if np.prod(sizes, dtype=float) > largest:
-            raise DeviceError(f"{interface.name}: {sizes} are too many sites; 32 bits can number {largest}")
+            raise DeviceError(f"{interface.name}: {sizes} are too many sites for a device, the limit is {largest}")
         if self._of_sizes[0] != sizes:
             self._of_sizes = sizes, {}
         real = np.float32 if interface.single else np.float64
@@ -93,4 +93,4 @@ class DeviceLattice(NumpyLattice):
             return session(self, self._module, x0, parameters, t0, draws, timed=timed)
         except OutOfMemoryError as error:
             sites = f"{self.interface.name}: too little memory for {x0.shape[1:]} sites"
-            raise DeviceError(f"{sites}: {error}\n  hint: take fewer") from error
+            raise DeviceError(f"{sites}: {error}\n  hint: take fewer sites") from error

@@ -133,7 +133,7 @@ def _listed(cl: Any) -> list[Any]:
     except cl.Error:
         devices = []
     if not devices:
-        hint = "install that of the card, or for the processor: pip install 'pyopencl[pocl]'"
+        hint = "install the driver of the card, or the driver for the processor by pip install 'pyopencl[pocl]'"
         raise DeviceError(f"OpenCL has no driver, or its driver finds no device; {hint}")
     order = [cl.device_type.GPU, cl.device_type.ACCELERATOR]
     return sorted(devices, key=lambda d: next((k for k, kind in enumerate(order) if d.type & kind), len(order)))
