@@ -203,7 +203,7 @@ def _print(examination: Examination, console: Console) -> None:
             for part, residual in statement.failing if console.verbose else ():
                 out(f"    {'':<19}  {part}: {residual}")
     if examination.unexamined:
-        out(f"  Not examined, because they depend on it: {examination.unexamined}")
+        out(f"  Not examined, because they depend on a refuted statement: {examination.unexamined}")
 
 
 def _lines(statement: Statement) -> list[str]:

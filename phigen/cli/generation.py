@@ -205,7 +205,7 @@ def _expect_steps(compilation: Compilation, target: str) -> None:
     if target == "device" and swept and swept.relative:
         message, hint = (
             "coordinates_from: the target device cannot make steps in relative coordinates",
-            "another target, or remove coordinates_from",
+            "choose another target, or remove coordinates_from",
         )
         raise SpecError([compilation.spec.diagnostic(("coordinates_from",), message, hint)])
 

@@ -72,7 +72,7 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         rows.append([_shortened(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *cells])
     for line in table(rows, right=[2, 3, 4]):
         out(f"  {line}")
-    out("\n  With a monitor steps are equal in τ, and still Poisson maps.")
+    out("\n  With a monitor, steps are equal in τ, and they are still Poisson maps.")
     for reason in dict.fromkeys(monitors.refused.values()):
         names = [_shortened(m) for m, refusal in monitors.refused.items() if refusal == reason]
         out(f"  Not measured: {'; '.join(names)}: {reason}.")
@@ -84,7 +84,7 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(tuning.horizon, run.step)
         out(f"    step: {step!r}\n    until: {end!r}")
     else:
-        out("  No monitor saves as much as its steps cost.")
+        out("  No monitor reduces the cost: the additional cost of a step is larger than the saving.")
 
 
 def _shortened(text: str) -> str:

@@ -77,7 +77,9 @@ def refuted(groups: Groups) -> list[Statement]:
 def refutation(examination: Examination) -> str:
     """Return the text of the error about the refuted statements, each with its place in the spec."""
     unexamined_note = (
-        f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
+        f"not examined, because they depend on a refuted statement: {examination.unexamined}"
+        if examination.unexamined
+        else ""
     )
     return "\n".join(
         str(

@@ -92,7 +92,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     if system.time:
         raise NotOfferedError("it depends on the time, and is not constant")
     if not compilation.exact:
-        raise NotOfferedError("the bi-realisation is an approximate one")
+        raise NotOfferedError("the bi-realisation is approximate")
     if system.noise:
         raise NotOfferedError("with noise a step is not the flow of a Hamiltonian")
     if system.forces:

@@ -52,11 +52,12 @@ MEANINGS = (
     Meaning(
         "Casimir: last/first window",
         "the largest error in the last tenth of the run, divided by that in the first tenth. The ratio is left "
-        "out if errors are rounding, or if some coordinate does not go back and forth within the first tenth",
+        "out if errors are rounding errors, or if some coordinate does not go back and forth within the first tenth",
     ),
     Meaning(
         "Casimir: spread over the sites",
-        "the standard deviation, over the sites, of the change of a Casimir between the first and the last frame",
+        "the standard deviation, over the sites, of the change of a Casimir between the first and the last stored "
+        "state",
     ),
     Meaning(
         "Casimir: largest change",
@@ -83,14 +84,14 @@ MEANINGS = (
     ),
     Meaning(
         "energy: last quarter/before",
-        "the largest energy error in the last quarter of a lattice run, divided by the largest before: about 1 without "
-        "drift. The ratio is left out if errors are rounding",
+        "the largest energy error in the last quarter of a lattice run, divided by the largest before this "
+        "quarter: about 1 without drift. The ratio is left out if errors are rounding errors",
         _DRIFT,
     ),
     Meaning(
         "energy balance: last quarter/before",
         "for H minus the work done, if H of a lattice depends on the time or forces act: the largest error in the "
-        "last quarter of the run, divided by the largest before",
+        "last quarter of the run, divided by the largest before this quarter",
     ),
     Meaning(
         "Poisson identity",
@@ -120,8 +121,8 @@ MEANINGS = (
     Meaning(
         "gradient against tangent maps",
         "for code with gradients: the difference between ⟨w, DΦ v⟩ by tangent maps and ⟨DΦᵀ w, v⟩ by gradients, "
-        "relative to the terms. Φ is a run of eleven steps, v a tangent vector at the start, w the cotangents after "
-        "every fourth step and at the end",
+        "relative to the terms. Φ is a run of eleven steps, v a tangent vector at the start, and w consists of "
+        "covectors after every fourth step and at the end",
         "the reverse pass is not the transpose of the steps",
     ),
     Meaning(

@@ -424,7 +424,7 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
         reversal_error,
         f"at most {ONE_STEP:g}" if symmetric else "",
         reversal_error <= ONE_STEP or not symmetric,
-        f"a step back misses by {reversal_error:.1e}",
+        f"a step of h and a step of −h miss the start by {reversal_error:.1e}",
         {name: worst(measures.reversal, m) for name, m in subject.others.items()},
     )
 

@@ -57,7 +57,7 @@ def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen
     for result in (phigen("build", path), phigen("check", path)):
         assert result.exit_code == 5
         assert result.stderr.count("refuted: ") + result.stderr.count(": refuted (") == 1, result.stderr
-    assert "depend on it: Casimirs, invariants, the method" in result.stdout
+    assert "depend on a refuted statement: Casimirs, invariants, the method" in result.stdout
     assert "Casimirs, invariants" in phigen("build", path).stderr
 
 

@@ -169,7 +169,7 @@ def test_a_loose_tolerance_is_found_out():
     compilation = compilation_of(text)
     verification = verified(compilation, {"c": solver_of(compilation, "c")})
     assert "reversibility: a step there and back" in failed(verification)
-    assert any("a step back misses by" in f for f in verification.failures)
+    assert any("a step of −h miss the start by" in f for f in verification.failures)
 
 
 def test_a_lower_order_than_stated_is_found_out():

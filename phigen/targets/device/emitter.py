@@ -61,7 +61,7 @@ def text_of_device(program: Program) -> str:
     """
     if program.step.swept and program.step.swept.relative:
         message = f"{program.name}: coordinates_from: devices have no steps in relative coordinates"
-        raise SpecError([Diagnostic(message, None, "another target, or remove coordinates_from")])
+        raise SpecError([Diagnostic(message, None, "choose another target, or remove coordinates_from")])
     common = has_common_coefficients(program)
     staged = len(program.fractions) > 1
     values = {
