@@ -159,9 +159,9 @@ def test_lattices_are_tuned_by_the_same_search(phigen, in_tmp):
 
 
 REFUSED = {
-    "noise: {kick: {hamiltonian: q, amplitude: 0.1}}": "where there is noise",
+    "noise: {kick: {hamiltonian: q, amplitude: 0.1}}": "for systems with noise",
     "damping: 0.1": "--measure orbit",
-    "time: t": "where H depends on the time",
+    "time: t": "for systems whose H depends on the time",
 }
 
 
