@@ -236,7 +236,7 @@ def test_invalid_sweeps_are_refused_before_they_start(options, said):
 @pytest.mark.parametrize("name", ["status", "final", "coordinate", "frame"])
 def test_names_that_the_store_needs_are_not_varied(tmp_path, name):
     spec = specs.loads(BODY.replace("I2", name))
-    with pytest.raises(SpecError, match=f"a sweep over '{name}'"):
+    with pytest.raises(SpecError, match=f"'{name}' is also the name"):
         phigen.sweep(spec, over={name: [1, 2]}, output=tmp_path / "map.zarr")
     assert not (tmp_path / "map.zarr").exists()
 
