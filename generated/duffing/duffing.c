@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 86b8c77391ef05e6cf2ef62f6944d754134e3722c85dd6892f1a5eb832ed00a3
+ * body-sha256: 2e1d83c3eb35f138f4913d2a29045c5ad4435101fe2d3fdb81501dd17dd0410e
  */
 #include "duffing.h"
 #include <float.h>
@@ -339,7 +339,7 @@ static void duffing_renew(duffing_solver *s)
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);

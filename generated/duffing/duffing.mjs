@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fe01838f2bc9487928ac21c84ebdf2b4d41cada5265a131480efead21a7ed07a
+ * body-sha256: 5ca5ec1ff1c1e059ead1fd260922d1b70ba7c28994eba0394e982929d5006b4d
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -239,7 +239,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);

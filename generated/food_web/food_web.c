@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 5899a38207d1e4b67bb41c76158123828dcfa3767d6be06bd95fbd66284c0fdd
+ * body-sha256: c2ebbfba060f59d44b14e740bb227c54e92f3783d567c14913fb096eaa935572
  */
 #include "food_web.h"
 #include <limits.h>
@@ -34,7 +34,7 @@ static const size_t food_web_least[food_web_AXES] = { 1 };
 /* For each part of H, 1 if its flow is made of one flow for each colour of sites, else 0. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
-/* Return the part of H, from 1, of flow *flow. *flow becomes the colour of the sites whose terms it has. */
+/* Return the part of H (1, 2, ...) of flow number *flow, and set *flow to the colour of its sites. */
 static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;
@@ -50,7 +50,7 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* For each row of coefficients, its flows of colours: 0 first, 1 inner, 2 last, 3 inner in reverse order. */
+/* For each row of coefficients, its flows: 0 the first, 1 the inner, 2 the last, 3 the inner in reverse. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
@@ -441,7 +441,7 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 /* ---- The flows ---- */
 enum { food_web_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flows of a stage, one for each colour. kind: 0 first, 1 inner, 2 last, 3 inner in reverse order. */
+/* Apply flows of a stage. kind: 0 the first flow, 1 the inner ones, 2 the last, 3 the inner in reverse. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
@@ -450,7 +450,7 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply flow `number` of step `steps`; food_web_FLOWS is the last flow merged with the first. */
+/* Apply flow `number` of step `steps`. Number food_web_FLOWS is flow 0 merged with the flow before. */
 static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;

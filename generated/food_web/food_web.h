@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 96273521342827429c25ce5097ebb2e33a390d7500820d3485f17ef967634e85
+ * body-sha256: b13c1c40efc723c86bb747e7925f2bbb0cb7364c1951dbd80b782724840f847a
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -71,7 +71,7 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 /* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,
    aligned as by malloc, and must outlive *s. bonds may be NULL if there are none, params for the defaults;
    all arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are not admissible, a bond does not connect
-   two different sites, x0 or a parameter is not finite, or one that must be positive is not. */
+   two different sites, a value is not finite, or a parameter that must be positive is not. */
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 

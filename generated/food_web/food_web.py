@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b9614738e40361aca68e9800ca63f4699b3fa6a96b7ca4a34e3a8ad3477c43fc
+# body-sha256: 4a0e997331caa8ca4684cea964c0067f84fcb287bd0ac191f4c4beaf82b57374
 import numpy as np
 
 VERSION = "0.1.0"
@@ -42,7 +42,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the states that
     integrate() stored before this step.
     """
 
@@ -310,7 +310,7 @@ def _sweep1(coef, x, sites):
     return moved
 
 
-# The sweeps of each part of H.
+# For each part of H, the functions that apply its flow to all sites ('sweeps').
 PARTS = (
     (_sweep1,),
 )

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: ce238dda5b46fe0a2382b8e28f1688ce97031ec6ffae58dc06b7334587af40ff
+ * body-sha256: c7351ee99c84e20b78b008155cd93e209ebc54efcc396d72f9dec08bdc192746
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -444,7 +444,7 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     guiding_centre_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* largest number of pieces of all paths in a stage; steps that need more have errors of the size of the
+    /* largest number of pieces of paths in a stage; steps that need more have errors of the size of the
        state */
     guiding_centre_MOST_PIECES = 512,
     /* number of iterations before the approximate Jacobian may be replaced by differences */
@@ -637,7 +637,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: eb6c8346bfc254e2e236a7bcaced905dcb3db7ab7c2dc7e3df9cbb37139368ed
+# body-sha256: faa416f572647fb62257582f02e1ca44cd51688ebd670db3081bbee4dadda255
 import numpy as np
 
 VERSION = "0.1.0"
@@ -180,7 +180,7 @@ def _generate(coef, y):
     )
 
 
-MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
+MOST_PIECES = 512  # largest number of pieces of paths in a stage; steps that need more have errors of the size of the state
 PATIENCE = 3  # number of iterations before the approximate Jacobian may be replaced by differences
 NEGLIGIBLE = 1e-17  # a Taylor series ends if its terms are below this fraction of the size of the path
 LEAST_SHARE = 1e-5  # size of a path m in coordinate i: |m_i| + this times the sum of all |m_j|

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f687058fb90d66106821d89758ae2d4739c2870055ff6748349b36b12bfd085d
+ * body-sha256: e6998121555a521ca59a18a764ac750befdf30969b16f62d5cef3b16aa9b7f15
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -56,8 +56,8 @@ size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)
    bytes, aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are
-   copied. Returns heisenberg_BAD_ARGUMENT if sizes are not admissible, x0 or a parameter is not finite, or
-   one that must be positive is not. */
+   copied. Returns heisenberg_BAD_ARGUMENT if sizes are not admissible, a value is not finite, or a parameter
+   that must be positive is not. */
 heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
@@ -112,14 +112,14 @@ size_t heisenberg_stages(void);
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
 /* heisenberg_begin computes the coefficients for a step size; call it before the first stage.
-   heisenberg_sweep makes a stage for the planes from ... to - 1. With full_range = 1, it uses functions for
-   arguments of any size; with full_range = 0, it uses faster functions, which give NaN if an argument is too
-   large. */
+   heisenberg_sweep makes a stage for the planes `from` ... `to` - 1. With full_range = 1, it uses functions
+   for arguments of any size; with full_range = 0, it uses faster functions, which give NaN if an argument is
+   too large. */
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int full_range, size_t from,
     size_t to);
 
-/* Read or write the values x[plane][site] of a field, counted from 0, on the planes from ... to - 1.
+/* Read or write the values x[plane][site] of a field, counted from 0, on the planes `from` ... `to` - 1.
    heisenberg_holds returns 1 if all fields are finite on these planes. */
 heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
     double *x);

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c0e2774d9db30e8a45319bf8961ae3bdf09ef039c609a3f65d39ad580223e294
+# body-sha256: 0980b65fb7066688ba82fe9fca4c1f814950c4af6c930247e03298eb68da615c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -42,7 +42,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the states that
     integrate() stored before this step.
     """
 
@@ -252,7 +252,7 @@ def _sweep3(coef, x, sites):
     return moved
 
 
-# The sweeps of each part of H.
+# For each part of H, the functions that apply its flow to all sites ('sweeps').
 PARTS = (
     (_sweep1,),
     (_sweep2,),

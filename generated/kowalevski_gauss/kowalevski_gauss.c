@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 4619fe20ef972a54099948ce53da7c7370c0b9991c6165ce68d7be180ff6f48d
+ * body-sha256: 53226905d26cd2bba91d18578adc7d547905fe8dd05132313fa41262de6687a1
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -413,7 +413,7 @@ static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevsk
     }
 }
 
-/* Index of the unknown that is number r among those that sweeps read: they read all unknowns. */
+/* Index of unknown number r among the unknowns that sweeps read. Sweeps read all unknowns. */
 #define kowalevski_gauss_READ(r) (r)
 
 /* Predict the unknowns z at the stages of a step whose size is ratio times that of the last step, by the
@@ -653,7 +653,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);

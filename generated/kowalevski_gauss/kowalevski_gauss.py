@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c2a823febedfc6747a59045b582ab725a20c27ac0052d097c606f5171e90a910
+# body-sha256: ac2221baf58ef72fec36f77f394452509a477ffc924a0bcadad88f980d9b1223
 import numpy as np
 
 VERSION = "0.1.0"
@@ -223,8 +223,8 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Number of unknowns whose changes are measured relative to |x|. They come first. The other unknowns are components of
-# group elements, with sizes near 1.
+# Number of unknowns whose changes are measured relative to |x|. They come first. Other unknowns, if any, are components
+# of the matrix or quaternion that moves the state, with sizes near 1.
 PLAIN = 4
 
 
@@ -294,7 +294,7 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, increments, fractions):
-    """Return states at fractions of a step that ends at x, from its `increments` in the unknowns of the next step."""
+    """Return states at fractions of a step that ends at x. Its increments are in the unknowns of the next step."""
     offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
@@ -304,7 +304,7 @@ PREDICTION = _factors_at(1 + NODES)
 
 
 def _with_new_step(memory, ratio):
-    """Return `memory` with predicted unknowns, for a step after a kick or of another size than the last step.
+    """Return `memory` with predicted unknowns, for a step after a change of the state or of the step size.
 
     `ratio` is the new size divided by the last one. If |ratio| > 1, there is no prediction.
     """

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 090723a6841ed6f51c47baabea4fbba01199fdb7cea35861de89b7a2e5954332
+ * body-sha256: f25ce874971d90b22e6a38689ea7c15a6b38d3efd72b61da5ec1dc29fb5720d8
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -680,8 +680,8 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
 }
 
 /* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now].
-   The method is fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther than range from
-   x are then refused. */
+   The method is fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther from x than
+   `range` are then refused. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
     int *now)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d1f295a2f0b69917f8fae41974c36b28b42452e17a0be8a815aacaee569842fb
+ * body-sha256: 11b882f9b6e60e28863c485bd5f5ee2e0a9daf8c7c0d8a528770abc1612f1a52
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -17,7 +17,7 @@ extern "C" {
 #define point_vortices_SPEC_SHA256 "d965bd92c708d41161c8d57d8630c9397f72d5c2059658e2d8ea3f1387ba2750"
 
 typedef struct {
-    const double *G; /* at sites: circulation; required, because its default is an array */
+    const double *G; /* at sites: circulation; required (no default) */
 } point_vortices_params;
 
 extern const point_vortices_params point_vortices_default_params;
@@ -74,7 +74,7 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has
    point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params must not be NULL,
    nor those of its arrays that have no default; all arrays are copied. Returns point_vortices_BAD_ARGUMENT if
-   sizes are not admissible, params or a required array is NULL, x0 or a parameter is not finite, or one that
+   sizes are not admissible, params or a required array is NULL, a value is not finite, or a parameter that
    must be positive is not. */
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a93581cd21d65a9ca66ddbd1955049c65a5fccf5b8058ce412bf6e1113b17bef
+# body-sha256: c20c01bdab22c3a0459a30c23736885b8b4c31b096e28fb9f3000ce7a0944bfa
 import numpy as np
 
 VERSION = "0.1.0"
@@ -44,7 +44,7 @@ SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the states that
     integrate() stored before this step.
     """
 

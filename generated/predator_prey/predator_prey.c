@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 3000999c1aabecf727d48550ca3958e4d40523a22549d0001981c1564725573f
+ * body-sha256: 1a58e656f65ad4525b5c429a981580b4655fb5d7d881f6a7bc692b1d50c5f3e7
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -306,7 +306,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);

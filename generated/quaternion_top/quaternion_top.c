@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 83537f4932329dbe054b0356d048b29385be39271e17b78e282b2fffbf23f5ab
+ * body-sha256: 41a206c0f79eb42fd5e1a60c8bcd6a35d37bac7ed70f8f2d7447966600119827
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -676,7 +676,7 @@ static void quaternion_top_path_field(const double *coef, const double p[7], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     quaternion_top_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* largest number of pieces of all paths in a stage; steps that need more have errors of the size of the
+    /* largest number of pieces of paths in a stage; steps that need more have errors of the size of the
        state */
     quaternion_top_MOST_PIECES = 512,
     /* number of iterations before the approximate Jacobian may be replaced by differences */
@@ -890,7 +890,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 89115c0fc7147e7d3833a3194341485517e968a98429f6a2235b3d63a5ef40a4
+# body-sha256: eea4d2a803968ac4be7ce961c18ee70fe5408413740bd4df8fe112391e12a610
 import numpy as np
 
 VERSION = "0.1.0"
@@ -447,7 +447,7 @@ def _generate(coef, y):
     )
 
 
-MOST_PIECES = 512  # largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state
+MOST_PIECES = 512  # largest number of pieces of paths in a stage; steps that need more have errors of the size of the state
 PATIENCE = 3  # number of iterations before the approximate Jacobian may be replaced by differences
 NEGLIGIBLE = 1e-17  # a Taylor series ends if its terms are below this fraction of the size of the path
 LEAST_SHARE = 1e-5  # size of a path m in coordinate i: |m_i| + this times the sum of all |m_j|

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 4c3b97dcf458ac4ca58f2fb07f3acc007215b6327a769eb3258cd862ecbd398a
+ * body-sha256: 74b2f85d771cbe996a22f145d2b547624e70a4de34cf1a8fd0ce0255f41cd0a2
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -873,7 +873,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* Make the stages that are solved together. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -1215,7 +1215,7 @@ typedef struct {
 } rigid_body_model;
 
 /* Compute the weights of the components of corrections of y: unit[i] = 1 / (|y_i| + rigid_body_FLOOR times
-   the largest |y_j|). If a step has several stages, |y_i| is the smallest of them. */
+   the largest |y_j|). If a step has several stages, |y_i| is its smallest value at the stages. */
 static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
@@ -1250,8 +1250,8 @@ static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[rest
     }
 }
 
-/* Largest value over the lanes, none of which may be negative; infinite if one is not finite. The bits of
-   positive numbers, read as integers, have the order of the numbers, and those of NaN are larger still. */
+/* Largest of the values in the lanes, which must not be negative; infinite if a value is not finite. The bits
+   of positive numbers, read as integers, have the order of the numbers, and the bits of NaN are larger. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], most = 0;
@@ -1315,8 +1315,8 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
 #define rigid_body_CAUTION 32.0
 
 /* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the
-   one before. The estimate is size^2 after the first correction, later size * size / before with a safety
-   margin, and 0 at rounding level. */
+   correction before it. The estimate is size^2 after the first correction, later size * size / before with a
+   safety margin, and 0 at rounding level. */
 static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes before,
     rigid_body_lanes left)
 {
@@ -1354,8 +1354,8 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* Advance x + carry through the steps of a block in order. The linear model of a step says that it adds
-   increment - gain * residual to x, with the residual of the equation for y. The residual of the next step
+/* Advance x + carry through the steps of a block in order. By its linear model, a step adds increment - gain
+   * residual to x, where residual is the residual of the equation for y. The residual of the next step
    follows from the residual of the present step, without the new x. most receives the largest correction of y
    in each lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
@@ -1566,8 +1566,8 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    /* number of steps in blocks that repay the fits; also the first number of steps without recurrences that
-       failed */
+    /* number of steps in blocks that repay the fits; also the number of steps without recurrences after they
+       first failed */
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
     rigid_body_MOST_SINGLE_STEPS = 1000, /* largest number of single steps after a failed block */
     /* recurrences are abandoned if a failed block leads to more single steps than this */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 63931574af30a97c5403d84adc69b15fe964ca1a3d7046684e256dbd15909cb7
+ * body-sha256: 62a105ce506ccf679effea1aff83a78d960f45b216c75fa0676152399fd9f977
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -537,7 +537,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);

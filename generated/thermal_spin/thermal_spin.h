@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4333040e2564a3e8e346537ad96eafec8e645849afeab2cc154b6d49a0eb7afd
+ * body-sha256: 402d844f0c1459c581aa95ae0f2ed53a265bfac2c999b139aa7899489941bc13
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -91,8 +91,8 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 
-/* As thermal_spin_ensemble, with a choice of random numbers: member m has those of `seed` and of member
-   number first_member + m, from step number first_step on. thermal_spin_ensemble takes 0 for seed,
+/* As thermal_spin_ensemble, with selected random numbers: member m has the random numbers of `seed` and
+   member number first_member + m, from step number first_step on. thermal_spin_ensemble takes 0 for seed,
    first_member and first_step. With OpenMP, members are integrated in parallel; the results do not depend on
    the number of threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e3db3661cc468b06736b3048900f6fdc75c0b1e316a6241cca4db6e35cbf2006
+ * body-sha256: 51e9099c068a25019724294930ab910eb4e2447156d7bf86ffc239eb75e610c0
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -337,7 +337,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 7009869cf9a0648bcda8bdc1f92db96efb70ae117d101b135a1e943bf9784b33
+ * body-sha256: e43025b970a059ced67ca84225de0676f12e459b773e448e0e82fb9dd6a883f6
  */
 #include "toda.h"
 #include <math.h>
@@ -340,7 +340,7 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* ---- The flows ---- */
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flow `number` of step `steps`; toda_FLOWS is the last flow merged with the first. */
+/* Apply flow `number` of step `steps`. Number toda_FLOWS is flow 0 merged with the flow before. */
 static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;

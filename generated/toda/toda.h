@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d0308167c2b29283ae203396b98b20977a24e788381ad208ef5c64c9a7a56b42
+ * body-sha256: a4a0a950a76e4d3cf2eb310058b00757c8b9999cabeeeaa52410c39b9ca8e9b6
  */
 #ifndef TODA_H
 #define TODA_H
@@ -54,7 +54,7 @@ size_t toda_work_size(const size_t sizes[toda_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,
    aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are copied.
-   Returns toda_BAD_ARGUMENT if sizes are not admissible, x0 or a parameter is not finite, or one that must be
+   Returns toda_BAD_ARGUMENT if sizes are not admissible, a value is not finite, or a parameter that must be
    positive is not. */
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
     const double *x0, void *work);

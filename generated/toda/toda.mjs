@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 60f477f2703b7db0c0147a721f3aa84772225004196923a1818a3748a64dafe4
+ * body-sha256: c16f8da1ac379517e284359298c832064193dcce90633042d951a6fc7cf4ca45
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -192,7 +192,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is no integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d557aae4bee5b9af4fb0ffabe3356150e6dcc1c6e5920e7e9ab4c0f80a10238e
+# body-sha256: 16e862e1ec4a1e64272bd2d57b00c95f24103097913dfb166643e98d3da31c0a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -40,7 +40,7 @@ SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: those that
+    step: number of the step, counted from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the states that
     integrate() stored before this step.
     """
 
@@ -211,7 +211,7 @@ def _sweep2(coef, x, sites):
     return moved
 
 
-# The sweeps of each part of H.
+# For each part of H, the functions that apply its flow to all sites ('sweeps').
 PARTS = (
     (_sweep1,),
     (_sweep2,),

@@ -188,8 +188,9 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
     rules = build.rules()
     later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
     point = [ir.vectors(ir.Vector(series), E), *[ir.vectors(values, F)] * bool(path.fixed)]
+    said = {"tangent": "a path with its variation", "back": "a path in the reverse pass"}.get(kind, f"a {kind}")
     of_series = (
-        f"Compute the coefficients of order 0 of all Taylor series of a {kind}; those of the coordinates are given"
+        f"Compute the coefficients of order 0 of all Taylor series of {said}; those of the coordinates are given"
     )
     of_order = "Compute coefficient k of all Taylor series, and coefficient k + 1 of the coordinates"
     at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
@@ -197,7 +198,7 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
         function("begin", of_series, ("coef", "p", "s", "f"), *build.fixed(), *build.first()),
         function("order", of_order, ("coef", "p", "s", "f", "k"), *later, *build.slopes()),
         function(
-            "field", f"Compute the derivative dm/dt of a {kind} at a point m", ("coef", "p", "m", "field"), *at_point
+            "field", f"Compute the derivative dm/dt of {said} at a point m", ("coef", "p", "m", "field"), *at_point
         ),
     ]
 

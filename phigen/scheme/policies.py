@@ -80,7 +80,7 @@ class PathPolicy(Policy):
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")
     most_pieces: int = count(
         512,
-        "largest number of pieces of all paths in a stage; steps that need more have errors of the size of the state",
+        "largest number of pieces of paths in a stage; steps that need more have errors of the size of the state",
     )
     patience: int = count(3, "number of iterations before the approximate Jacobian may be replaced by differences")
     negligible: float = number(

@@ -70,7 +70,7 @@ ENTIRE: dict[str, Entire] = {
         1.0,
     ),
     "sinroot1": Entire(
-        "the derivative of sin(sqrt(s))/sqrt(s)",
+        "The derivative of sin(sqrt(s))/sqrt(s)",
         lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 3),
         (lambda f, s, root: (f.cosroot(s) - f.sinroot(s)) / (2 * s),),
         lambda call, s: (call("cosroot", s) - call("sinroot", s)) / (2 * s),
@@ -86,7 +86,7 @@ ENTIRE: dict[str, Entire] = {
         1.0,
     ),
     "arcroot1": Entire(
-        "the derivative of (sqrt(s) - sin(sqrt(s)))/sqrt(s)**3",
+        "The derivative of (sqrt(s) - sin(sqrt(s)))/sqrt(s)**3",
         lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 5),
         (lambda f, s, root: (f.sinroot(s / 4) ** 2 / 2 - 3 * f.arcroot(s)) / (2 * s),),
         lambda call, s: (call("sinroot", s / 4) ** 2 / 2 - 3 * call("arcroot", s)) / (2 * s),
@@ -102,7 +102,7 @@ ENTIRE: dict[str, Entire] = {
         0.5,
     ),
     "exprel1": Entire(
-        "the derivative of (exp(s) - 1)/s",
+        "The derivative of (exp(s) - 1)/s",
         lambda n: (n + 1) * _factorial(n + 2),
         (lambda f, s, root: (f.exp(s) - f.exprel(s)) / s,),
         lambda call, s: (call("exp", s) - call("exprel", s)) / s,

@@ -188,11 +188,11 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
         trail = text_of(program).trail(program, step, lanes)
-        sizes.append(("TRAIL", trail, "numbers on the tape for each step, for the reverse pass"))
+        sizes.append(("TRAIL", trail, "doubles on the tape, the data for the reverse pass, for each step"))
         if has["EACH"]:
             batch = 1 if step.kind.flows else LANES * _packs_back(lanes, has)
             sizes.append(
-                ("TRAIL_EACH", trail * max(1, batch), "numbers on the tape for each step of a batch of members")
+                ("TRAIL_EACH", trail * max(1, batch), "doubles on the tape for each step of a batch of members")
             )
     if has["PREDICTED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()

@@ -98,7 +98,7 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
         *(["bonds: [...]"] if step.others.graph else []),
         "params: { ... }",
     ]
-    how = "stages, each solved by sweeps over the sites" if step.equation else "flows of parts of H"
+    how = "iterations over all sites" if step.equation else "flows of parts of H"
     return [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
         f"const solver = new Solver({{ {', '.join(options)} }});",

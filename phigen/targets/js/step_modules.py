@@ -67,7 +67,7 @@ def _path(program: Program, path: Recurrences, kind: str) -> str:
     """
     blocks = PathFunctions(program, path, PathLayout()).blocks()
     lines = {name: [line.removeprefix("  ") for line in statements(function)] for name, function in blocks.items()}
-    return render("js", "path.mjs", {**lines, "kind": kind})
+    return render("js", "path.mjs", {**lines, "kind": kind, "varied": kind == "tangent"})
 
 
 def _path_kernels(program: Program, step: Path) -> Sequence[Kernel | None]:

@@ -121,9 +121,13 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
         stages = step.equation.kernels
         yield from (function(lowering.stage(temporaries(loops.stage(kernel)))) for kernel in stages)
     else:
-        yield _table("PARTS", "The sweeps of each part of H.", step.parts)
+        sweeps_of_part = "For each part of H, the functions that apply its flow to all sites ('sweeps')."
+        yield _table("PARTS", sweeps_of_part, step.parts)
         if loops.program.extras.tangent:
-            yield _table("TANGENTS", "Their derivatives.", step.tangents)
+            derivatives = (
+                "For each part of H, the functions that multiply a tangent vector by the derivatives of its sweeps."
+            )
+            yield _table("TANGENTS", derivatives, step.tangents)
     yield from _transposes(loops, lowering, {k.name: k for k in step.adjoint.steps}) if step.adjoint else ()
     for kernel in (*loops.program.observables.kernels, *step.rate_kernels):
         yield function(lowering.observable(temporaries(loops.observable(kernel))))
@@ -158,4 +162,7 @@ def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str
         stages = (step.equation.relax, step.equation.advance)
         yield from (function(staged(kernels[kernel.name + BACK])) for kernel in stages)
     else:
-        yield _table("PARTS_BACK", "Their transposes.", step.parts, BACK)
+        transposed = (
+            "For each part of H, the transposed sweeps: they map cotangents after a sweep to cotangents before it."
+        )
+        yield _table("PARTS_BACK", transposed, step.parts, BACK)

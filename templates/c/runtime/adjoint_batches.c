@@ -19,7 +19,7 @@ typedef struct {
 #include "state_of_back_group.h"
 } phi_back_group;
 
-/* Add more to sum, lane by lane. */
+/* Add `more` to `sum`, lane by lane. */
 static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double more[restrict PHI_LANES])
 {
     PHI_EACH_LANE

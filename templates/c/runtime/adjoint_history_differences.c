@@ -4,10 +4,10 @@
 
 #include "adjoint_stage.c"
 
-#define PHI_AT_ONCE ((size_t)1) /* after so many steps, the solutions of these steps are read from the predictor */
+#define PHI_AT_ONCE ((size_t)1) /* number of steps after which their solutions are read from the predictor */
 
-/* Write the solution of a stage in the last step to the tape. The predictor of the stage has stored it. Returns 0 for
-   more than one step. */
+/* Copy the last solution of a stage from its predictor to the tape. Returns 0 if steps > 1: the predictor stores no
+   earlier solutions. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     if (steps > 1) return 0;

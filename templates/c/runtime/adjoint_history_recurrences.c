@@ -4,10 +4,10 @@
 
 #include "adjoint_stage.c"
 
-#define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* after so many steps, the solutions of these steps are read from the predictor */
+#define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* number of steps after which their solutions are read from the predictor */
 
-/* Write the solutions of a stage in the last steps to the tape. The predictor of the stage stores solutions; returns 0
-   if it stores too few. */
+/* Copy the solutions of a stage in the last steps from its predictor to the tape. Returns 0 if the predictor stores
+   too few solutions. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     const size_t count = (size_t)history->count;

@@ -4,8 +4,7 @@
 #include "model.h"
 #include "solver.c"
 
-/* Arguments of phi_pullback_each; the member `each` is the number of doubles in the rows of one member of the ensemble.
-   */
+/* Arguments of phi_pullback_each. each: number of doubles in the output rows of one member of the ensemble. */
 typedef struct {
     const phi_params *params;
     const double *x0, *h, *rows_bar;

@@ -5,8 +5,8 @@
 #include <string.h>
 #include "adjoint_stage.c"
 
-/* Pull a cotangent back through an implicit stage with solution y. Since Dy = jacobian^-1, the derivative of the stage
-   is 1 + increment_jacobian Dy. */
+/* Pull a cotangent back through an implicit stage with solution y. The derivative of y by x is jacobian^-1, so the
+   derivative of the stage is 1 + increment_jacobian jacobian^-1. */
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -8,7 +8,7 @@
 
 #define PHI_BACK_NEGLIGIBLE 1e-18    /* terms of a series that are smaller than this, relative to start and sum, are negligible */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* accepted error of the slope of a series, relative to the path and its slope */
-#define PHI_ANCHORED 8               /* the end of a path is corrected at most so often to make its mean equal to y */
+#define PHI_ANCHORED 8               /* largest number of corrections of the end of a path, to make its mean equal to y */
 #define PHI_ANCHORED_TO 1e-15        /* accuracy that these corrections give to the mean, relative to y */
 
 /* A path that is integrated backward has four groups of quantities: the state, its cotangent, the cotangent of p, and

@@ -173,7 +173,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps in blocks that repay the fits; also the first number of steps without recurrences that failed */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps in blocks that repay the fits; also the number of steps without recurrences after they first failed */
     PHI_MOST_SINGLE_STEPS = 1000,     /* largest number of single steps after a failed block */
     PHI_TOO_MANY = 5 * PHI_LANES      /* recurrences are abandoned if a failed block leads to more single steps than this */
 };

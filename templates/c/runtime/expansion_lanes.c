@@ -20,7 +20,7 @@ enum {
 
 /* The path dm/dt = pi(m) p in each lane, as Taylor series about its middle: with p/2 in place of p, time goes from -1
    to 1, and fewer terms are needed than from the start. s[i][k] is coefficient k of series i; the coordinates are the
-   first series. slope has the series of the entries of d(pi p)/dm and of pi, from which v follows: the derivatives of
+   first series. slope has the series of the entries of d(pi p)/dm and of pi. From slope follows v: the derivatives of
    the path by its middle and by p, row by row. */
 typedef struct {
     phi_lanes p[PHI_DIM], fixed[PHI_FIXED], slope_fixed[PHI_SLOPE_FIXED], value[PHI_SERIES];
@@ -157,7 +157,7 @@ static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes
     phi_check_end(coef, e, end, end_slope, wrong);
 }
 
-/* Start the expansions of the paths whose mean is y. Their middles are y + middle, as far as known. */
+/* Start the expansions of the paths whose mean is y, at the present estimates y + middle of their middles. */
 static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e)
 {

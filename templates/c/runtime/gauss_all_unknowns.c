@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_GAUSS_ALL_UNKNOWNS
 #define PHI_FILE_GAUSS_ALL_UNKNOWNS
 #if PHI_STAGED
-/* Index of the unknown that is number r among those that sweeps read: they read all unknowns. */
+/* Index of unknown number r among the unknowns that sweeps read. Sweeps read all unknowns. */
 #define PHI_READ(r) (r)
 
 #endif

@@ -106,8 +106,8 @@ static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi
     return best;
 }
 
-/* Make a fixed-point sweep over all stages: compute the increments from the unknowns z, and add their squared changes to
-   sum, unless it is NULL. */
+/* Make a fixed-point sweep over all stages: compute the increments `now` from the unknowns z. Unless sum is NULL, add
+   the squared changes of the increments to sum. */
 static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z, phi_batch now, double *sum)
 {
     phi_lanes next[PHI_UNKNOWNS];

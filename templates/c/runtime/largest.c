@@ -6,8 +6,8 @@
 
 #include "lanes.c"
 
-/* Largest value over the lanes, none of which may be negative; infinite if one is not finite. The bits of positive numbers,
-   read as integers, have the order of the numbers, and those of NaN are larger still. */
+/* Largest of the values in the lanes, which must not be negative; infinite if a value is not finite. The bits of positive
+   numbers, read as integers, have the order of the numbers, and the bits of NaN are larger. */
 static double phi_largest(const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], most = 0;

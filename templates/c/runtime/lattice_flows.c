@@ -36,7 +36,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 
 #endif
 #if PHI_BY_COLOUR
-/* Apply flows of a stage, one for each colour. kind: 0 first, 1 inner, 2 last, 3 inner in reverse order. */
+/* Apply flows of a stage. kind: 0 the first flow, 1 the inner ones, 2 the last, 3 the inner in reverse. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FULL_RANGE)
 {
 #if PHI_TIMED

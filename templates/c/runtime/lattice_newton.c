@@ -61,7 +61,7 @@ static double phi_range(phi_solver *s, const double *coef)
 
 
 /* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now]. The method is
-   fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther than range from x are then refused. */
+   fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther from x than `range` are then refused. */
 static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_RANGE, double range, int *now)
 {
     double before = 0.0;

@@ -21,7 +21,7 @@ typedef struct {
 #include "newton_stages.c"
 
 /* Compute the weights of the components of corrections of y: unit[i] = 1 / (|y_i| + PHI_FLOOR times the largest |y_j|). If a
-   step has several stages, |y_i| is the smallest of them. */
+   step has several stages, |y_i| is its smallest value at the stages. */
 static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -66,7 +66,7 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #define PHI_BLOCK_ROUNDING 1e-10
 #define PHI_CAUTION 32.0 /* safety margin, since corrections shrink more slowly with reused matrices than with new ones */
 
-/* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the one before.
+/* Estimate the size of the next correction. `size` is the size of the last correction, `before` that of the correction before it.
    The estimate is size^2 after the first correction, later size * size / before with a safety margin, and 0 at rounding
    level. */
 static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)

@@ -105,8 +105,8 @@ phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t c
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
-/* As phi_ensemble, with a choice of random numbers: member m has those of `seed` and of member number first_member + m,
-   from step number first_step on. phi_ensemble takes 0 for seed, first_member and first_step. With OpenMP, members are
+/* As phi_ensemble, with selected random numbers: member m has the random numbers of `seed` and member number
+   first_member + m, from step number first_step on. phi_ensemble takes 0 for seed, first_member and first_step. With OpenMP, members are
    integrated in parallel; the results do not depend on the number of threads. */
 phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);

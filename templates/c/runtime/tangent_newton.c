@@ -9,9 +9,9 @@
 #include "tangent_implicit.c"
 #include "tangent_product.c"
 
-/* Compute the derivative of one implicit stage, 1 + increment_jacobian Dy, where Dy = jacobian^-1 follows from the
-   equation alpha(y) = x of the stage. The solution y of this equation is first refined to rounding level, starting from
-   the stored value. */
+/* Compute the derivative of one implicit stage: 1 + increment_jacobian Dy. The derivative Dy of y by x is jacobian^-1,
+   by the equation alpha(y) = x of the stage. The solution y is first refined to rounding level, starting from the
+   stored value. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

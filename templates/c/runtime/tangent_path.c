@@ -83,9 +83,10 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
     return 0;
 }
 
-/* Compute the derivative of one stage, which follows a path from x with a covector p that solves p = grad S_h(mean). It is
-   end_x + end_p Dp, where (1 - H mean_p) Dp = H mean_x with the Hessian H of S_h, and end_x ... mean_p are derivatives of
-   end and mean of the path by x and p. p is first refined to rounding level, starting from `value`, the stored mean. */
+/* Compute the derivative of one stage, which follows a path from x with a covector p that solves p = grad S_h(mean). The
+   derivative is end_x + end_p Dp. The derivative Dp of p by x solves (1 - H mean_p) Dp = H mean_x, where H is the Hessian
+   of S_h; end_x, end_p, mean_x and mean_p are derivatives of end and mean of the path by x and p. p is first refined to
+   rounding level, starting from `value`, the stored mean. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -24,7 +24,9 @@ export class History {
   /** Number of sweeps of the last step, and the factor by which changes shrink from sweep to sweep. */
   sweeps = 2;
   rate = 0.5;
-  /** Stage increments of the last step, in the frame at its end; size of the last step. */
+  /**
+   * Stage increments of the last step, transformed to the unknowns of the next step; size of the last step.
+   */
   increments = stages();
   h = NaN;
 

@@ -20,7 +20,8 @@ const field = new Float64Array(DIM);
 
 /**
  * Whether the slope of the Taylor series of a path at its end m is pi(m) p. If not, the series only seems to
- * have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value.
+ * have converged: it has gaps between its terms, such as t + t^9, or extends across the kink of an absolute
+ * value.
  */
 function holds(coef, p) {
   pathField(coef, p, fixed, end, field);

@@ -7,9 +7,9 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 // ---- The derivative of an implicit stage ----
 
 /**
- * The derivative of a stage, 1 + incrementJacobian Dy, and its increment as change. Dy = jacobian^-1 follows
- * from the equation alpha(y) = x of the stage, whose solution y is first refined to rounding level, starting
- * from the stored value.
+ * The derivative of a stage, 1 + incrementJacobian Dy, and the increment of the stage as `change`. The
+ * derivative Dy of y by x is jacobian^-1, by the equation alpha(y) = x of the stage. The solution y is first
+ * refined to rounding level, starting from the stored value.
  */
 export function differentiateStage(solver, stage, at) {
   const y = solver.history[stage].last();

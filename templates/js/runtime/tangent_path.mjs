@@ -81,10 +81,11 @@ function varyPath(coef, x, p, seed) {
 }
 
 /**
- * The derivative of a stage, end_x + end_p Dp, and its increment as change. The stage follows a path whose
- * covector solves p = grad S_h(mean); so (1 - H mean_p) Dp = H mean_x with the Hessian H of S_h, where end_x
- * ... mean_p are derivatives of end and mean of the path. p is first refined to rounding level, from the
- * stored mean.
+ * The derivative of a stage, end_x + end_p Dp, and the increment of the stage as `change`. The stage follows
+ * a path from x whose covector p solves p = grad S_h(mean). So the derivative Dp of p by x solves
+ * (1 - H mean_p) Dp = H mean_x, where H is the Hessian of S_h. Here end_x, end_p, mean_x and mean_p are
+ * derivatives of end and mean of the path by x and p. p is first refined to rounding level, from the stored
+ * mean.
  */
 export function differentiateStage(solver, stage, at) {
   const coef = solver.coef[stage];

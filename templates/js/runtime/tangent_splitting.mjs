@@ -4,7 +4,10 @@ import { identity, multiplied } from "./tangent.mjs";
 
 // ---- The derivative of a step of flows ----
 
-/** The derivative of a step, the product of the derivatives of its flows, and its increment as change. */
+/**
+ * The derivative of a step, which is the product of the derivatives of its flows, and the increment of the
+ * step as `change`.
+ */
 export function differentiateStage(solver, stage, at) {
   const y = Float64Array.from(at.x);
   const displacement = Float64Array.from(at.carry);

@@ -162,7 +162,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
     if parameter.at != "all":
         if parameter.values is not None:
             said = plain(parameter.description) or ("" if member == parameter.name else parameter.name)
-            said = "; ".join(filter(None, [said, "required, because its default is an array"]))
+            said = "; ".join(filter(None, [said, "required (no default)"]))
             return f"const double *{member};", f"at {parameter.at}: {said}"
         return f"const double *{member};", f"at {parameter.at}: {said}; NULL for the default everywhere"
     return f"double {member};", said
@@ -234,7 +234,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         )
         yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
-            yield "REACH", reach(step), "y at a site depends on so many sites on each side"
+            yield "REACH", reach(step), "number of sites on each side on which y at a site depends"
             yield "BAND", band(step), "number of off-diagonals on each side in the matrix of Newton's method"
     else:
         yield "FLOWS", len(step.schedule.flows), "number of flows in a step"

@@ -109,6 +109,16 @@ Calls = dict[str, list[_Call]]
 Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 
+def _purpose(loop: ir.Function, name: str) -> str:
+    """Return the comment on a loop that is printed with the given name.
+
+    The comment on a loop for arguments of any size refers to the loop for small arguments, which has the same name up
+    to the suffix.
+    """
+    before, after = (text.partition("_full_range")[0] for text in (loop.name, name))
+    return loop.doc.replace(f"{before}_near", f"{after}_near")
+
+
 @dataclass(frozen=True)
 class _PartLoops:
     """The loops and row drivers of all parts of H. If ``rows`` is None, they compute the derivatives of the flows along
@@ -139,7 +149,7 @@ class _PartLoops:
             shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
             loop = replace(same[0].loop, name=shared or same[0].loop.name)
             names[key] = loop.name
-            yield printed(program, loop, [call.loop.doc for call in same])
+            yield printed(program, loop, [_purpose(call.loop, loop.name) for call in same])
         has, coloured = switches(layout), bool(step.by_colour)
         threads = 0 if self.varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
         name = (
