@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b13c1c40efc723c86bb747e7925f2bbb0cb7364c1951dbd80b782724840f847a
+ * body-sha256: dd739f0fb4dab20cd9a8d99d91bd01ccda6899802ecb117ca01af4b81ac80495
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -77,7 +77,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
+   call. With OpenMP, threads share the sites; the number of threads does not change results. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4a0e997331caa8ca4684cea964c0067f84fcb287bd0ac191f4c4beaf82b57374
+# body-sha256: 9d85a09314731c0d2d585b9e7cea7b1473c09ccc66560574bdf2ca395c4e56ee
 import numpy as np
 
 VERSION = "0.1.0"
@@ -141,8 +141,8 @@ class _Graph(_Sites):
         """Return three arrays over all bonds: `here`, `there` and the number of the bond.
 
         A bond connects a site a with a site b. `here` is the site at the given end, "a" or "b", and `there` the site at
-        the opposite end. If end is "", each bond occurs twice, once for each end. If chosen is "here" or "there", the
-        arrays contain only bonds whose site here or there has the present colour.
+        the opposite end. If end is "", each bond occurs twice, once for each end. If chosen is "here", the arrays
+        contain only bonds whose site `here` has the present colour; if "there", only bonds whose site `there` has it.
         """
         key = (end, chosen, chosen and self.colour)
         if key not in self._known:

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e6998121555a521ca59a18a764ac750befdf30969b16f62d5cef3b16aa9b7f15
+ * body-sha256: 7719b8d5f75b2163c39ddc278191b0fa4db3595113661e5244eb7fcc11c47415
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -63,7 +63,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
+   call. With OpenMP, threads share the sites; the number of threads does not change results. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 11b882f9b6e60e28863c485bd5f5ee2e0a9daf8c7c0d8a528770abc1612f1a52
+ * body-sha256: bd928ed0acead0fe961c08f9b386caf0dacf86b593c19f4b858d145145e26c76
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -81,7 +81,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. With OpenMP, threads share the sites; the number of threads does not
-   change the bits. */
+   change results. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 

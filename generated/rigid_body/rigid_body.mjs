@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 62a105ce506ccf679effea1aff83a78d960f45b216c75fa0676152399fd9f977
+ * body-sha256: 6e1b050e7075e5b05270025407c61f10bf7d42dbb970c63c01aa3ac218f340fc
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -1119,8 +1119,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error if gauge[c] is increased by t width (see leastOnLine). The error is a polynomial in t of
- * degree DEGREE, given by its forward differences.
+ * Value of the error if gauge[c] is increased by t * width (see leastOnLine). The error is a polynomial in t
+ * of degree DEGREE, given by its forward differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];

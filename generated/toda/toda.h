@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a4a0a950a76e4d3cf2eb310058b00757c8b9999cabeeeaa52410c39b9ca8e9b6
+ * body-sha256: 6c8c84552420295e423471a7c9da05975ddd8320e20120044efe094398676134
  */
 #ifndef TODA_H
 #define TODA_H
@@ -61,7 +61,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and
    s->steps counts the successful steps. The last flow of a step is merged with the first of the next step or
-   call. With OpenMP, threads share the sites; the number of threads does not change the bits. */
+   call. With OpenMP, threads share the sites; the number of threads does not change results. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 

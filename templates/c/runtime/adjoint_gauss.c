@@ -83,7 +83,7 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
 
 #if PHI_FRAMED
 /* Transform cotangents of unknowns from the frame at the end of the step to the frame at its start: multiply them by the
-   transpose of the matrix of the change of frame, whose columns are the images of unit vectors. */
+   transpose of a matrix. Its columns are the unit vectors, transformed to the frame at the end. */
 static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *bar)
 {
     phi_lanes next_frame_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];

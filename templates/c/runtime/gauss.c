@@ -138,8 +138,8 @@ static int phi_best_predictor(phi_history *past, double scale, double element_sc
 }
 
 #else
-/* Squared change of the unknowns by a sweep, as a mean over the stages. The first PHI_PLAIN unknowns are relative to
-   |x|, or to their increments if x = 0; the others have sizes near 1. */
+/* Squared change of unknowns by a sweep, as a mean over stages. The first PHI_PLAIN changes are relative to |x|, or to
+   the increments if x = 0; other unknowns have sizes near 1. */
 static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
 {
     double square = DBL_MIN, sum[PHI_NODES] = { 0.0 };

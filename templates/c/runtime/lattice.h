@@ -34,15 +34,15 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
 #if PHI_SERIES || PHI_NOISE
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
-   counts the successful steps. With OpenMP, threads share the sites; the number of threads does not change the bits. */
+   counts the successful steps. With OpenMP, threads share the sites; the number of threads does not change results. */
 #elif PHI_CORRECTED
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
    counts the successful steps. Each call begins and ends with the flows of the corrector. With OpenMP,
-   threads share the sites; the number of threads does not change the bits. */
+   threads share the sites; the number of threads does not change results. */
 #else
 /* Make one step, or many, of size h, which may be negative. If a step fails, the state before it is kept, and s->steps
    counts the successful steps. The last flow of a step is merged with the first of the next step or call. With
-   OpenMP, threads share the sites; the number of threads does not change the bits. */
+   OpenMP, threads share the sites; the number of threads does not change results. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);

@@ -4,7 +4,10 @@ import { uniformMotion } from "./attitude_rate.mjs";
 import { rateOf } from "./attitude_rate_plain.mjs";
 import { ATTITUDE, ELEMENT, TURNING } from "./model.mjs";
 
-/** Compute the rate of the gauge rotation, after x or the attitude has been set. */
+/**
+ * Compute the rate of the gauge rotation, after x or the attitude has been set. This rotation is uniform: it
+ * is due to the multiples of Casimirs that are subtracted from H.
+ */
 export function takeTurningRate(solver) {
   solver.turningRate = new Float64Array(TURNING);
   rateOf(solver, solver.turningRate);

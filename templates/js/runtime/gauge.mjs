@@ -49,8 +49,8 @@ function gaugeError(params, gauge, samples) {
 }
 
 /**
- * Value of the error if gauge[c] is increased by t width (see leastOnLine). The error is a polynomial in t of
- * degree DEGREE, given by its forward differences.
+ * Value of the error if gauge[c] is increased by t * width (see leastOnLine). The error is a polynomial in t
+ * of degree DEGREE, given by its forward differences.
  */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];

@@ -229,7 +229,8 @@ export class Sites {
   /**
    * Lists `here`, `there` and `bond` over all bonds, seen from their ends a or b, or from both ends (""): the
    * site at the end from which a bond is seen, the site at its opposite end, and the number of the bond. With
-   * chosen = "here" or "there", only bonds are listed whose site here or there has the colour.
+   * chosen = "here", only bonds are listed whose site `here` has the colour; with chosen = "there", only
+   * bonds whose site `there` has it.
    */
   bonds(end, chosen, colour) {
     const key = `${end} ${chosen} ${chosen && colour}`;
