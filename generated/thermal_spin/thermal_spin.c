@@ -4,7 +4,7 @@
  *   rights in it.
  *   bi-realisation (alpha, beta): exponential, symmetric; steps from alpha(y, p) to beta(y, p)
  *   generating function: S_h = h S_1 (collected polynomial, 1 term)
- *   forces: p = h (grad H + zeta); zeta and f are the covector and vector forces of the spec
+ *   forces: p = h (grad H + zeta), with the covector force zeta
  *   with forces a step is not a Poisson map; the forces conserve all Casimirs
  *   noise: bath_x, bath_y, bath_z; in the sense of Stratonovich, along Hamiltonian fields, so it conserves
  *     all Casimirs

@@ -73,9 +73,9 @@ class Turning:
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """Return the flows with increments written by functions of half the rotation angles.
+    """Return the flows, with increments that are expressed in functions of half the rotation angles.
 
-    The group elements of the flows need these functions anyway, so they are computed once.
+    The group elements of the flows need the same functions, so that each function is computed only once.
     """
     turning_parts = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turning_parts, strict=True))

@@ -166,11 +166,10 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield a label and an expression for the angle θ.
+    """Yield a label and an expression that is 0 if the formulas of this module for θ and θ̇ agree.
 
-    This module states formulas for θ and for θ̇. The expression vanishes if the formula for θ̇ is the time derivative
-    of the formula for θ. ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest
-    E_i.
+    The expression vanishes if the formula for θ̇ is the time derivative of the formula for θ. ``order`` has the indices
+    of the axes l, m, h with the smallest, the middle and the largest E_i.
     """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")

@@ -113,7 +113,9 @@ def command(
     if spec.forces and measure == "energy":
         place = ("damping",) if ("damping",) in spec.locations else ("forces",)
         message = "forces change the energy, so its change is not an error of the method"
-        raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
+        raise SpecError(
+            [spec.diagnostic(place, message, "use --measure orbit, which compares orbits with a reference solution")]
+        )
     origin = origin_of(spec, run_of(spec, name), "tune")
     expect_same_origin({"--plot": plot}, origin)
     compilation = compile_proved(spec.for_running(profile=profile))

@@ -96,10 +96,10 @@ def moving(system: System) -> list[str]:
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """Return the unit of a quantity with this ``value`` at the start of a trajectory, and with terms of this size.
+    """Return the unit in which the errors of a quantity are measured.
 
-    If the value is small compared with ``terms``, errors are relative to ``terms``; ``kind`` is then the kind of the
-    unit, `TERMS` or `SITES`.
+    ``value`` is the quantity at the start of a trajectory, and ``terms`` is the size of the terms in its sum. If the
+    value is small compared with ``terms``, the unit is ``terms``, with the kind ``kind``: `TERMS` or `SITES`.
     """
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))

@@ -36,7 +36,7 @@ def known_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
-    """Yield faithful representations in the order of preference, without the matrices that a spec gives."""
+    """Yield the faithful representations that phigen constructs, in the order of preference."""
     yield from _matching_families(algebra)
     field = algebra.field
     adjoint = _adjoint(algebra, field)

@@ -210,8 +210,9 @@ def _facts(
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
     g = "g " * bool(gauge.monitor)
+    slope = "(grad H + zeta)" if system.forces and acts(system.forces.covector) else "grad H"
     halves = f", impulses h {g}f/2 before and after" if system.forces and acts(system.forces.vector) else ""
-    yield from force_facts(system, f"p = h {g}(grad H + zeta){halves}")
+    yield from force_facts(system, f"p = h {g}{slope}{halves}")
     yield from noise_facts(system, weak=1)
     yield f"step: {step.kind.manner}"
     yield scheme.note

@@ -231,11 +231,10 @@ def orders(composition: str) -> list[int]:
 
 
 def arranged(splitting: SplitHamiltonian) -> SplitHamiltonian:
-    """Return the parts in the order in which a step of an alternation is cheapest, with the most expensive part
-    last.
+    """Return the parts in the order in which a step of an `Alternation` is cheapest: the most expensive part last.
 
-    In a step of s stages, the flow of the last part occurs s times, and the flow of the first part s + 1 times. The
-    flow of every other part occurs 2s times.
+    The last flow occurs s times in a step with 2s coefficients α_i, the first flow s + 1 times, and each other flow 2s
+    times.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
     return SplitHamiltonian((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))

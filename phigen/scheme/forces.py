@@ -11,7 +11,10 @@ from phigen.symbolic.expression import Expression
 def force_facts(system: System, manner: str) -> Iterator[str]:
     """Yield the header lines on the forces of a system; ``manner`` is the formula by which forces enter the step, or
     ""."""
-    yield from forced_lines(system.forces is not None, system.pushed, manner)
+    forces = system.forces
+    pairs = (("covector force zeta", forces.covector), ("vector force f", forces.vector)) if forces else ()
+    named = " and ".join(f"the {name}" for name, force in pairs if acts(force))
+    yield from forced_lines(forces is not None, system.pushed, f"{manner}, with {named}" if manner else "")
 
 
 def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[str]:
@@ -20,7 +23,7 @@ def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[s
     if not forced:
         return
     if manner:
-        yield f"forces: {manner}; zeta and f are the covector and vector forces of the spec"
+        yield f"forces: {manner}"
     effect = f"the forces change {', '.join(pushed)}" if pushed else "the forces conserve all Casimirs"
     yield f"with forces a step is not a Poisson map; {effect}"
 

@@ -67,7 +67,7 @@ def differences(
 
 
 def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry ``about`` of a plan, with the folder of the spec as one more value ``folder``."""
+    """Return a copy of ``about``, the origin of a sweep, with the additional key ``folder``: the folder of the spec."""
     return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
 
 

@@ -69,9 +69,9 @@ _LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 
 
 def _library(name: str, **other_names: str) -> dict[str, str]:
-    """Return the table ``written`` for a function that the libraries of all languages have.
+    """Return how each language writes a function that all their libraries have: format strings, by language.
 
-    ``other_names`` maps a language to the name of the function in the library of this language, if it is not ``name``.
+    ``other_names`` maps a language to the name of the function in its library, where this name is not ``name``.
     """
     return {language: call.format(other_names.get(language, name)) for language, call in _LIBRARIES.items()}
 

@@ -143,8 +143,8 @@ class _StatementPrinter:
     def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
         """Yield the lines of statements."""
         if self.shared_line:
-            # Declarations of values that are printed in place come first, so that they do not separate other
-            # declarations, which share lines.
+            # Consecutive declarations share a line. Values that are printed where they are used need no line. Their
+            # declarations come first, so that other declarations are consecutive.
             body = sorted(body, key=lambda s: not (isinstance(s, ir.Declare) and s.in_place))
         for kind, group in groupby(body, self._kind):
             if kind == "discards":
