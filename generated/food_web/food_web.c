@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: c2ebbfba060f59d44b14e740bb227c54e92f3783d567c14913fb096eaa935572
+ * body-sha256: 9d9b90fd9f69bbdb0c1ebe0ee06a8dcf45ca24c335ebf0bb0895308356b2cd7c
  */
 #include "food_web.h"
 #include <limits.h>
@@ -90,7 +90,7 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns 1, the number of rows, or 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

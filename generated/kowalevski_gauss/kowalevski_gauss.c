@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 53226905d26cd2bba91d18578adc7d547905fe8dd05132313fa41262de6687a1
+ * body-sha256: 7037f69ccd6dcbcad7a354a5675b48214af5f374de5306b590edcd002b46a4d9
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -125,7 +125,7 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES] __attribute__((ali
 typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #endif
 
-/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
+/* This macro before a loop over lanes tells the compiler that the iterations are independent. */
 #if defined(__clang__)
 /* clang must not unroll loops over lanes, since it would then vectorise the loops around them instead. */
 #define kowalevski_gauss_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: f25ce874971d90b22e6a38689ea7c15a6b38d3efd72b61da5ec1dc29fb5720d8
+ * body-sha256: 443f03a6b9986e1195b4265ca54f8321cd75fef5f7ddbbc333a816380911b53b
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns 1, the number of rows, or 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

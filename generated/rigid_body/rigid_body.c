@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 74b2f85d771cbe996a22f145d2b547624e70a4de34cf1a8fd0ce0255f41cd0a2
+ * body-sha256: 701038db0919e1a4697b4688c9fdc1cdb3f5c498d522e5b3ff60839de324d089
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -999,7 +999,7 @@ typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); 
 typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
-/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
+/* This macro before a loop over lanes tells the compiler that the iterations are independent. */
 #if defined(__clang__)
 #define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push

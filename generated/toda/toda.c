@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: e43025b970a059ced67ca84225de0676f12e459b773e448e0e82fb9dd6a883f6
+ * body-sha256: 609f9da2a7fbffa6a64c7786a8aaacf81c9a46cdba30672b80490e0c556aa9d0
  */
 #include "toda.h"
 #include <math.h>
@@ -84,7 +84,7 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns 1, the number of rows, or 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

@@ -126,8 +126,8 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
     """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
     The first columns are for the stage increments L_j of the last step. Further columns are for the preceding step, if
-    the predictor reads it. If ``integrated``, the matrices predict integrals of the offsets over time, which `Tableau`
-    explains at ``doubled``.
+    the predictor reads it. If ``integrated``, the matrices predict the integrals that the field ``doubled`` of
+    `Tableau` defines.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)

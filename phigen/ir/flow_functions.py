@@ -267,7 +267,7 @@ class FlowTransposes:
 
     @property
     def _stored(self) -> Mapping[str, ir.ParameterType]:
-        """Types of the parameters of functions with a tape; the tape holds the coordinates of all packs of a group."""
+        """Types of the parameters of functions with a tape, which holds the coordinates of all members of a group."""
         return {**_TYPES, "tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
 
     def group_flows(self) -> ir.Function:

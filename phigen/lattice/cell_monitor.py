@@ -74,7 +74,7 @@ def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
             return k
     parts = ", ".join(f"the sum of {shortened(flow.hamiltonian)}" for flow in flows)
     message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {parts}"
-    hint = "positive: true declares the sign of a parameter; in hamiltonian, a constant can be subtracted from a part"
+    hint = "write positive: true at parameters that are positive, or subtract a constant from a part in hamiltonian"
     raise SpecError([spec.diagnostic(("monitor",), message, hint)])
 
 

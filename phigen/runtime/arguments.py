@@ -27,7 +27,7 @@ LARGEST_SINGLE = float(np.finfo(np.float32).max)
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
-#: Selection of random numbers if seed, member and step0 are all omitted.
+#: Value of the argument ``selections`` if seed, member and step0 are all omitted.
 NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 
 

@@ -21,9 +21,10 @@ def along_mean(n: int) -> Kernel:
     """Return the kernel that differentiates α and β − α with respect to the mean y of a path with n
     coordinates.
 
-    Its inputs are Hess S_h, and derivatives with respect to m, the middle of the path, and to p: those of ``even``,
-    ``odd`` and the mean. Let M and N be the derivatives of the mean with respect to m and p. For fixed p, the
-    derivative of m with respect to y is M⁻¹. If p = ∇S_h(y) varies with y, the derivative of m is M⁻¹ (1 − N Hess S_h).
+    Let m be the middle of the path. The inputs of the kernel are Hess S_h, and the derivatives of three functions of m
+    and p: ``even`` and ``odd``, which the text of this module defines, and the mean of the path. Let M and N be the
+    derivatives of the mean with respect to m and p. For fixed p, the derivative of m with respect to y is M⁻¹. If p =
+    ∇S_h(y) varies with y, the derivative of m is M⁻¹ (1 − N Hess S_h).
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))

@@ -107,7 +107,7 @@ def _stays(form: Form, changes: Mapping[str, Expression]) -> bool:
 
 
 def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> list[tuple[int, Expression]]:
-    """Return a pair for each value: its parity in h, the duration of a flow, and the value with −h in place of h.
+    """Return a pair for each value: its parity in the duration h of a flow, and the value with −h in place of h.
 
     ``of_symbols`` has the parities of symbols; symbols that are not listed are even.
     """

@@ -119,7 +119,7 @@ class _ModifiedRecursion:
         self.composed.append((target, Taylor([target], self.tower, [*self.momenta, *self.times])))
 
     def _level(self, j: int, level: int) -> Poly:
-        """Return the coefficient of h^level in H_j(α(x, ∇S(σ))), a polynomial in σ."""
+        """Return the coefficient of h^level in H_j(α(x, ∇S(σ))), with the σ and S(σ) of the text of this module."""
         pair = self.composed[j]
         if pair is None:
             return self.tower.zero

@@ -25,10 +25,10 @@ _Place = tuple[int, Monomial]
 
 
 def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """Yield lists of terms in which some terms are replaced by their sum: cancelling terms, linear terms, and both
-    kinds.
+    """Yield lists of terms in which some terms are replaced by their sum.
 
-    Nothing is yielded if π is constant.
+    The first list sums terms in whose vector fields monomials cancel each other, the second sums linear terms, and the
+    third does both. Lists that change nothing are left out. Nothing is yielded if π is constant.
     """
     if not _algebra(ring):
         return

@@ -525,5 +525,5 @@ def test_states_at_times_are_those_after_whole_steps():
     run = solver(made("thermal"), "numpy").integrate([0, 0, 1], 0.1, 6, 2, seed=3)
     assert run.at([0.4, 0.2]).tolist() == [run.x[2].tolist(), run.x[1].tolist()]
     for between in (0.1, 0.25):
-        with pytest.raises(ValueError, match=f"{between} is between two of them"):
+        with pytest.raises(ValueError, match=f"the time {between} is between two stored states"):
             run.at([0.2, between])

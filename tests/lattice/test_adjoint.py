@@ -268,7 +268,7 @@ def precise_end(x, alpha, beta, bar, module):
 def test_gradient_agrees_with_many_digits():
     solver = phigen.compile("fput", target="numpy", adjoint=True, order=2)
     module, x = solver.backend._module, beginning(solver)
-    assert not any(module.MULTIPLES)
+    assert not hasattr(module, "MULTIPLES")
     ones = np.ones((2, SITES))
     moved = module.PARTS[0][0]([0.1] * 9, ones, module._Sites(ones.shape, {}))
     module.DRIFT = module.PARTS[int(moved[0, 0] == 1.0)][0].__name__

@@ -21,7 +21,7 @@ typedef double phi_lanes[PHI_LANES] __attribute__((aligned(64))); /* one value i
 typedef double phi_lanes[PHI_LANES];
 #endif
 
-/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
+/* This macro before a loop over lanes tells the compiler that the iterations are independent. */
 #if defined(__clang__)
 #if PHI_PACKS || PHI_STAGED
 /* clang must not unroll loops over lanes, since it would then vectorise the loops around them instead. */

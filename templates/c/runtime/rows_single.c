@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Set the padded length of the only row. Returns the number of rows, 1, or 0 if the size is not allowed. */
+/* Set the padded length of the only row. Returns 1, the number of rows, or 0 if the size is not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;
