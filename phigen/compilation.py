@@ -179,7 +179,7 @@ class _Compiled(ABC):
         return None
 
     def named(self, method: str) -> str:
-        """Return ``method``, a line that names the method. Subclasses may add the reason for the method."""
+        """Return the line ``method``, which names the method. Subclasses may add the reason for the method."""
         return method
 
     def by_series(self) -> CompiledSeries:
@@ -548,7 +548,9 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return ``method``, a line that names the method. A reason follows if the sizes in runs decide the method."""
+        """Return the line ``method``, which names the method. The line goes on with the reason if the sizes of the runs
+        decided the colours, the seam or the scheme.
+        """
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count

@@ -42,7 +42,7 @@ class Direction:
 
 
 def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
-    """Return exp(p, t), or the Cayley transform of (p, t) if ``cayley``, before the division by lengths.
+    """Return exp(p, t), or the Cayley transform of (p, t) if ``cayley``, not yet divided by its ``length``.
 
     p is the rotation vector and t the translation; ``t`` is empty for rotations.
     """

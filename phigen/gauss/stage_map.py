@@ -521,11 +521,12 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Return the derivatives of the functional λ (`phigen.gauss.square_zero`) as the next step needs them.
+    """Return the derivative of the functional λ in the frame of the next step; see `phigen.gauss.square_zero`.
 
-    ``k`` has the derivatives in the present step, at whose end G = g + n. ``turned`` has the derivative ġ for the next
-    step. The result is k(bg*) − λ(sg*) for all basis elements b of the subalgebra, where s is the symmetric part of ġb.
-    The second term is subtracted since the functional x̃ of the next step is 0 at s.
+    ``k`` is the derivative of λ in the present step, at whose end the group element is G = g + n. ``turned`` is the
+    derivative ġ in the next step. The result has the entries k(bg*) − λ(sg*) for the basis elements b of the
+    subalgebra, where s is the symmetric part of ġb. The second term is subtracted since the functional of the next
+    step is 0 at s.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

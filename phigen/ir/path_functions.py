@@ -79,7 +79,7 @@ class PathFunctions:
         return [*enumerate(self.path.series)][self.program.dimension :]
 
     def blocks(self) -> dict[str, ir.Function]:
-        """Return the blocks of statements of the path as functions without parameters, by name."""
+        """Return the pieces of code that compute the path, by name; each piece is a function without parameters."""
         parts = (self.fixed, self.first, self.rules, self.slopes, self.nodes, self.field)
         return {part.__name__: ir.Function(part.__name__, "", Role.OTHER, (), part()) for part in parts}
 

@@ -19,7 +19,7 @@ KIND = "log-canonical"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j. It is symmetric.
+    """Return the symmetric bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j.
 
     The maps are defined for all (x, p). β − α is −2 x_j sinh(½u_j) with u_j = Σ_i a_ij x_i p_i, written without
     cancellation for small u_j. Raises `SpecError` if π is not log-canonical.

@@ -292,7 +292,7 @@ def ensemble(
         values[name] = array(per_member[name], f"parameter {name!r}", shape)
         if violated := broken_bound(name, values[name], interface):
             m = int(np.argmin(values[name] >= 0 if violated == "nonnegative" else values[name] > 0))
-            raise ValueError(f"parameter {name!r} must be {violated}, not {float(values[name][m])}, as of member {m}")
+            raise ValueError(f"parameter {name!r} of member {m} must be {violated}, not {float(values[name][m])}")
     if alone is not t0 and interface.time:
         begin = array(t0, "the times t0", shape)  # type: ignore[arg-type]
     size = array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]

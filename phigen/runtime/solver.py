@@ -721,7 +721,7 @@ class Solver(Named[Backend, Interface]):
             if beyond_range := self.interface.single and arguments.beyond_single(
                 {**state, **parameters, "the step h": h}
             ):
-                message = f"{name}: {beyond_range}" + (f", as of member {error.members[0]}" if error.members else "")
+                message = f"{name}: {beyond_range}" + (f" (member {error.members[0]})" if error.members else "")
                 return ParameterError(
                     message, step=0, status=error.status, trajectory=trajectory, members=error.members
                 )

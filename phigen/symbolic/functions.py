@@ -69,7 +69,7 @@ _LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 
 
 def _library(name: str, **other_names: str) -> dict[str, str]:
-    """Return how each language writes a function that all their libraries have: format strings, by language.
+    """Return format strings, by language, for a function that the libraries of all languages have.
 
     ``other_names`` maps a language to the name of the function in its library, where this name is not ``name``.
     """

@@ -154,7 +154,7 @@ def test_what_is_not_given_to_each_is_that_of_all(target):
         ({"h": [0.1, np.nan, 0.1]}, ValueError, "step size h must be finite"),
         ({"I9": [1.0, 2.0, 3.0]}, TypeError, "unknown parameter 'I9'"),
         ({"I1": [1.0, 2.0, 3.0], "parameters": {"I1": 1}}, TypeError, "given twice"),
-        ({"I1": [1.0, 0.0, 3.0]}, ValueError, "'I1' must be positive, not 0.0, as of member 1"),
+        ({"I1": [1.0, 0.0, 3.0]}, ValueError, "'I1' of member 1 must be positive, not 0.0"),
         ({"I1": np.array([1.0, 2.0, 3.0j])}, TypeError, "'I1' must be real"),
         ({"I1": ["1", "2", "3"]}, TypeError, "'I1' must be an array of numbers"),
         ({"I1": [10**400] * 3}, ValueError, "'I1' must be finite"),

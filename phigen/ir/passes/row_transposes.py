@@ -343,9 +343,9 @@ def _zero(name: str) -> ir.Declare:
 
 
 def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: ir.Pointer = WRITTEN) -> ir.Declare:
-    """Return the declaration of a pointer to array ``k`` in a ``member`` of the row record.
+    """Return the declaration of a pointer to array ``k`` of the field ``member`` of the record of a row segment.
 
-    With a ``layout``, the pointer is to the row of the segment in this array.
+    With a ``layout``, the pointer is to the first site of the segment in this array.
     """
     array = ir.entry(ir.Member(ROW, member), k)
     return ir.Declare(kind, ((ir.fixed(f"{prefix}_{k}").symbol, layout.row(array) if layout else array),))

@@ -136,7 +136,7 @@ class _PartLoops:
 
     @property
     def by_part(self) -> bool:
-        """Whether each part has its own row driver. This is faster for short rows."""
+        """Whether each part has its own function that runs over the rows. This is faster for short rows."""
         return self.loops.fast and not self.loops.layout.single_row and not self.varied
 
     def texts(self) -> Iterator[str]:
