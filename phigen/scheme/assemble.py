@@ -11,7 +11,7 @@ from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.adjoint import adjoint_path, completed, explicit_adjoint, level_adjoint, newton_adjoint
 from phigen.scheme.discretisation import Discretisation, expect_few
-from phigen.scheme.forces import acts, force_facts
+from phigen.scheme.forces import force_facts, forced_gradient, has_vector_force
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
@@ -210,9 +210,8 @@ def _facts(
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     yield from gauge.facts
     g = "g " * bool(gauge.monitor)
-    slope = "(grad H + zeta)" if system.forces and acts(system.forces.covector) else "grad H"
-    halves = f", impulses h {g}f/2 before and after" if system.forces and acts(system.forces.vector) else ""
-    yield from force_facts(system, f"p = h {g}{slope}{halves}")
+    halves = f", impulses h {g}f/2 before and after" if has_vector_force(system) else ""
+    yield from force_facts(system, f"p = h {g}{forced_gradient(system)}{halves}")
     yield from noise_facts(system, weak=1)
     yield f"step: {step.kind.manner}"
     yield scheme.note

@@ -13,7 +13,7 @@ def force_facts(system: System, manner: str) -> Iterator[str]:
     ""."""
     forces = system.forces
     pairs = (("covector force zeta", forces.covector), ("vector force f", forces.vector)) if forces else ()
-    named = " and ".join(f"the {name}" for name, force in pairs if acts(force))
+    named = " and ".join(f"the {name}" for name, force in pairs if _acts(force))
     yield from forced_lines(forces is not None, system.pushed, f"{manner}, with {named}" if manner else "")
 
 
@@ -28,6 +28,16 @@ def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[s
     yield f"with forces a step is not a Poisson map; {effect}"
 
 
-def acts(force: Sequence[Expression]) -> bool:
+def forced_gradient(system: System) -> str:
+    """Return the text "grad H" of headers, with the covector force zeta added if the system has one."""
+    return "(grad H + zeta)" if system.forces and _acts(system.forces.covector) else "grad H"
+
+
+def has_vector_force(system: System) -> bool:
+    """Whether the system has a vector force f."""
+    return system.forces is not None and _acts(system.forces.vector)
+
+
+def _acts(force: Sequence[Expression]) -> bool:
     """Whether at least one component of a force is not literally 0."""
     return any(not f.is_zero for f in force)

@@ -14,7 +14,7 @@ from phigen.geometry.shapes import Affine, LiePoisson, coordinate_terms
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
 from phigen.scheme.discretisation import expect_few
-from phigen.scheme.forces import acts, force_facts
+from phigen.scheme.forces import force_facts, forced_gradient, has_vector_force
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.gauss_kernels import change_kernel, elapsed_kernel, field_kernel, frame_kernel, lift_kernel
 from phigen.scheme.gauss_reduction import reduced_sweeps
@@ -277,8 +277,7 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
         yield "structure: exact, a step is a Poisson map, since the brackets are constant"
     yield from gauge.facts
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
-    slope = "pi(grad H + zeta)" if system.forces and acts(system.forces.covector) else "pi grad H"
-    impulse = " + f" if system.forces and acts(system.forces.vector) else ""
-    yield from force_facts(system, f"{slope}{impulse} at the stages")
+    vector = " + f" * has_vector_force(system)
+    yield from force_facts(system, f"pi {forced_gradient(system)}{vector} at the stages")
     yield f"step: {step.kind.manner}"
     yield order.note

@@ -169,6 +169,11 @@ def rounding_of(compilation: Compilation) -> float:
 class CompiledMethod(Protocol):
     """A method that makes runs from the initial state of a problem, usually in compiled code."""
 
+    @property
+    def rounding(self) -> float:
+        """The relative rounding error of one step."""
+        ...
+
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
         """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after all steps; None if a step
         fails."""
@@ -188,6 +193,11 @@ class Candidate:
 
     solver: Backend
     problem: Problem
+
+    @property
+    def rounding(self) -> float:
+        """The relative rounding error of one step, of the number type of the solver."""
+        return self.problem.rounding
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
         problem = self.problem
@@ -222,6 +232,11 @@ class Classical:
     runner: race.Runner
     state: Floats
     problem: Problem
+
+    @property
+    def rounding(self) -> float:
+        """The relative rounding error of one step. Classical methods have double precision."""
+        return ROUNDING
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
         marks = row_steps(steps, stride)

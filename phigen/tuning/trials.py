@@ -10,7 +10,7 @@ import numpy as np
 
 from phigen.study.methods import size_of
 from phigen.symbolic.arrays import Floats
-from phigen.tuning.problem import ROUNDING, Candidate, CompiledMethod, Problem, steps_in
+from phigen.tuning.problem import ROUNDING, CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
 #: Approximate number of equidistant times at which an orbit is compared with the reference solution.
@@ -81,7 +81,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
-        rounding_unit = _rounding_unit(problem, method)
+        rounding_unit = method.rounding
         # Even if the measured error is 0, rounding errors are expected in a longer run.
         largest, time = max(largest, rounding_unit), steps * h
         growth = _growth(errors, rounding_unit)
@@ -111,7 +111,7 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         expected = reference(stride * h, count)
         size = size_of(expected)
         errors = np.max(np.abs(states - expected), axis=1) / size
-        rounding_unit = _rounding_unit(problem, method)
+        rounding_unit = method.rounding
         largest = max(float(np.max(errors)), rounding_unit)
         growth, time = _growth(errors, rounding_unit), stride * count * h
         power = 1.0 if math.isnan(growth) or (bounded and growth < STEADY) else min(max(growth, 1.0), 2.0)
@@ -120,11 +120,6 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         return Point(h, error, largest, time, cost, growth, unit=rounding_unit) if math.isfinite(cost) else None
 
     return measure
-
-
-def _rounding_unit(problem: Problem, method: CompiledMethod) -> float:
-    """Return the relative rounding error of one step of a method; classical methods have double precision."""
-    return problem.rounding if isinstance(method, Candidate) else ROUNDING
 
 
 def _growth(errors: Floats, rounding_unit: float) -> float:

@@ -21,7 +21,7 @@ from phigen.spec.names import NEAR_INTEGRABLE
 from phigen.targets.header import split
 from phigen.tuning import search
 from phigen.tuning.building import Built, Refusal, build, build_all
-from phigen.tuning.problem import SINGLE_ROUNDING, SystemProblem
+from phigen.tuning.problem import ROUNDING, SINGLE_ROUNDING, SystemProblem
 from phigen.tuning.references import agreed, orbit_error
 from phigen.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.tuning.settings import GAUSS, OWN, SPLITTING, Setting, charts, own_setting, variants
@@ -264,6 +264,8 @@ def test_run_that_the_budget_does_not_allow_is_confirmed_over_a_part():
 
 class Drifting:
     """Fictitious method: the first coordinate of the state is 1 + rate·t + wobble·sin²t."""
+
+    rounding = ROUNDING
 
     def __init__(self, rate=0.0, wobble=0.0):
         self.rate, self.wobble = rate, wobble
