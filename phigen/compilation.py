@@ -139,15 +139,12 @@ class _Compiled(ABC):
     def notes(self) -> list[str]:
         """Choices of the compiler that the user may not expect, each as a line of text."""
         choice_note = f"scheme: auto chose {self.choice}" if self.choice else ""
-        return [*filter(None, [choice_note, self.order.note]), *map(self._note_on_unused, self.unused)]
+        return [*filter(None, [choice_note, self.order.note])]
 
     @property
-    def unused(self) -> list[str]:
-        """Keys of the spec that have no effect. They apply to the scheme of the spec, which an option replaced."""
+    def unused(self) -> list[tuple[str, ...]]:
+        """Paths of the keys of the spec that have no effect, since an option replaced the scheme that they are for."""
         return []
-
-    def _note_on_unused(self, key: str) -> str:
-        return f"{key} has no effect: it applies to another scheme than {self.scheme_name}"
 
     @property
     def monitor(self) -> Expression | None:
@@ -387,9 +384,10 @@ class CompiledSplitting(_CompiledSystem):
         return True
 
     @property
-    def unused(self) -> list[str]:
-        """Keys of the spec that have no effect, such as a tolerance: flows are exact."""
-        return [*self.spec.series_settings, *(f"solver: {key}" for key in self.spec.solve_settings)]
+    def unused(self) -> list[tuple[str, ...]]:
+        """Paths of the keys of the spec that have no effect, such as a tolerance: flows are exact."""
+        paths_of_solver = [("solver", key) for key in self.spec.solve_settings]
+        return [*((key,) for key in self.spec.series_settings), *paths_of_solver]
 
     def by_splitting(self) -> CompiledSplitting:
         """Return this compilation. Compilations with other schemes raise `ValueError`."""
@@ -436,9 +434,9 @@ class CompiledGauss(_CompiledSystem):
         return self.order.order
 
     @property
-    def unused(self) -> list[str]:
-        """Keys of the spec that have no effect, such as ``terms``: Gauss methods have no series."""
-        return self.spec.series_settings
+    def unused(self) -> list[tuple[str, ...]]:
+        """Paths of the keys of the spec that have no effect, such as ``terms``: Gauss methods have no series."""
+        return [(key,) for key in self.spec.series_settings]
 
     @property
     def notes(self) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from math import prod
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from phigen.cli.console import Console, heading, out, out_json, pass_console, ve
 from phigen.cli.failures import Collector
 from phigen.cli.generation import expect_target
 from phigen.cli.sources import load_all
-from phigen.errors import CheckError, Diagnostic, SpecError
+from phigen.errors import CheckError, Diagnostic, PhigenWarning, SpecError
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -132,13 +133,15 @@ def _compared(
 
 
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
-    from phigen.proofs.examination import hint_of
+    from phigen.proofs.examination import hint_of, unused_keys
 
     counts = Counter(s.verdict for s in examination.statements)
     summary = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
     console.note(f"{examination.spec.file}: {summary or 'nothing was proved'}")
     for note in examination.compilation.notes if examination.compilation else ():
         console.note(f"{examination.spec.file}: {note}")
+    for warning in unused_keys(examination):
+        warnings.warn(str(warning), PhigenWarning, stacklevel=2)
     mistakes = [s.name for _, s in examination.mistakes]
     if mistakes:
         hints = dict.fromkeys(hint_of(examination.spec, group) for group, _ in examination.mistakes)

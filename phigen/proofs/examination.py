@@ -107,7 +107,8 @@ def hint_of(spec: Spec, group: str) -> str:
 
 
 def doubts(examination: Examination) -> list[Diagnostic]:
-    """Return warnings about expressions that seem to be undefined, everywhere or at the start of a run.
+    """Return warnings about expressions that seem to be undefined, everywhere or at the start of a run, and about keys
+    without effect.
 
     Each warning has its place in the spec.
     """
@@ -115,7 +116,17 @@ def doubts(examination: Examination) -> list[Diagnostic]:
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))
         for s in examination.groups.get(DEFINEDNESS, ())
     ]
-    return [replace(d, severity="warning") for d in messages]
+    return [*(replace(d, severity="warning") for d in messages), *unused_keys(examination)]
+
+
+def unused_keys(examination: Examination) -> list[Diagnostic]:
+    """Return a warning for each key of the spec without effect, since an option replaced the scheme that it is for."""
+    compilation, spec = examination.compilation, examination.spec
+    if compilation is None:
+        return []
+    ending = f"has no effect with scheme: {compilation.scheme_name}"
+    messages = [(path, f"{': '.join(path)} {ending}") for path in compilation.unused]
+    return [replace(spec.diagnostic(path, message), severity="warning") for path, message in messages]
 
 
 def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:

@@ -4,8 +4,9 @@ import pytest
 from support import compile_text
 
 from phigen.compilation import Compilation
-from phigen.compiler import SCHEME_COMPILERS, compile_spec
-from phigen.errors import SpecError
+from phigen.compiler import SCHEME_COMPILERS, compile_proved, examine
+from phigen.errors import PhigenWarning, SpecError
+from phigen.proofs.examination import unused_keys
 from phigen.scheme.program import Program
 from phigen.spec import loads
 from phigen.spec.names import SCHEMES
@@ -109,9 +110,9 @@ def test_a_lattice_is_compiled_by_the_scheme_that_it_names_or_refused(scheme):
         assert compilation.scheme_name == scheme
 
 
-def test_keys_that_a_replaced_scheme_does_not_use_are_noted():
-    """An option that replaces the scheme of the spec leaves keys of the former scheme without effect, which the notes
-    say.
+def test_keys_that_a_replaced_scheme_does_not_use_are_warned_of():
+    """An option that replaces the scheme of the spec leaves keys of the former scheme without effect. Warnings say so,
+    with the place of each key.
     """
     text = (
         "phigen: 1\nname: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
@@ -119,11 +120,12 @@ def test_keys_that_a_replaced_scheme_does_not_use_are_noted():
         "order: 2\nbirealisation: canonical-euler\n"
     )
     tolerance = "solver: {tolerance: 1.0e-9}\n"
-    assert compile_spec(loads(text + tolerance)).notes == []
-    assert compile_spec(loads(text), scheme="gauss").notes == [
-        "birealisation has no effect: it applies to another scheme than gauss"
-    ]
-    assert compile_spec(loads(text + tolerance), scheme="splitting").notes == [
-        "birealisation has no effect: it applies to another scheme than splitting",
-        "solver: tolerance has no effect: it applies to another scheme than splitting",
+    assert unused_keys(examine(loads(text + tolerance))) == []
+    (gauss,) = unused_keys(examine(loads(text), scheme="gauss"))
+    assert str(gauss).startswith("<string>:7:16: warning: birealisation has no effect with scheme: gauss")
+    with pytest.warns(PhigenWarning) as caught:
+        compile_proved(loads(text + tolerance), scheme="splitting")
+    assert [str(w.message).split("\n")[0] for w in caught] == [
+        "<string>:7:16: warning: birealisation has no effect with scheme: splitting",
+        "<string>:8:21: warning: solver: tolerance has no effect with scheme: splitting",
     ]
