@@ -31,6 +31,7 @@ from fractions import Fraction
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.matrix_algebras import algebra_of_sparse_matrices
+from phigen.spec.names import FAMILIES
 from phigen.symbolic.expression import number
 
 #: Sparse matrix: (row, column), both from 0, → nonzero entry.
@@ -116,18 +117,10 @@ def _aff(n: int) -> tuple[int, list[Entries]]:
     return n + 1, [_unit(i, j) for i, j in _all(n)] + [_unit(i, n) for i in range(n)]
 
 
-#: The families by name. A family is a tuple of three: the smallest size n; the dimension as a function of n; and a
-#: function of n that returns the number of rows of the basis matrices and their entries.
-FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, list[Entries]]]]] = {
-    "so": (2, lambda n: n * (n - 1) // 2, _so),
-    "se": (2, lambda n: n * (n + 1) // 2, _se),
-    "sl": (2, lambda n: n * n - 1, _sl),
-    "gl": (1, lambda n: n * n, _gl),
-    "su": (2, lambda n: n * n - 1, _su),
-    "sp": (2, lambda n: n * (n + 1) // 2, _sp),
-    "heisenberg": (1, lambda n: 2 * n + 1, _heisenberg),
-    "aff": (1, lambda n: n * n + n, _aff),
-}
+#: For each family, a function of the size n that returns the number of rows of the basis matrices and their entries.
+_BASES: dict[str, Callable[[int], tuple[int, list[Entries]]]] = {
+    "so": _so, "se": _se, "sl": _sl, "gl": _gl, "su": _su, "sp": _sp, "heisenberg": _heisenberg, "aff": _aff,
+}  # fmt: skip
 
 
 def dimension(family: str, size: int) -> int:
@@ -138,7 +131,7 @@ def dimension(family: str, size: int) -> int:
     if family not in FAMILIES:
         families = ", ".join(f"{name}(n)" for name in FAMILIES)
         raise SpecError([Diagnostic(f"unknown Lie algebra {family}({size})", hint=f"known families: {families}")])
-    smallest, dimension_of, _ = FAMILIES[family]
+    smallest, dimension_of = FAMILIES[family]
     if size < smallest:
         raise SpecError([Diagnostic(f"{family}({size}) does not exist: its size is at least {smallest}")])
     if family == "sp" and size % 2:
@@ -152,7 +145,7 @@ def named(family: str, size: int) -> LieAlgebra:
     Raises the errors of `dimension`.
     """
     dimension(family, size)
-    matrix_size, basis = FAMILIES[family][2](size)
+    matrix_size, basis = _BASES[family](size)
     matrices = [{position: number(v) for position, v in sorted(m.items())} for m in basis]
     return algebra_of_sparse_matrices(f"{family}({size})", matrix_size, matrices)
 
@@ -160,7 +153,7 @@ def named(family: str, size: int) -> LieAlgebra:
 def families_of_dimension(dimension: int) -> list[tuple[str, int]]:
     """Return the pairs (family, size) of all named Lie algebras with this dimension."""
     families = []
-    for name, (smallest, dimension_of, _) in FAMILIES.items():
+    for name, (smallest, dimension_of) in FAMILIES.items():
         step = 2 if name == "sp" else 1
         size = smallest
         while dimension_of(size) < dimension:

@@ -71,11 +71,9 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "su": (2, lambda n: n * n - 1),
     "sp": (2, lambda n: n * (n + 1) // 2),
     "heisenberg": (1, lambda n: 2 * n + 1),
-    "aff": (1, lambda n: 2),
+    "aff": (1, lambda n: n * n + n),
 }
-#: Families of Lie algebras that are available for a few n only, with these n.
-MEMBERS = {"se": (2, 3), "aff": (1,)}
-FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
+FAMILY_HELP = "so(n), se(n), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(n)"
 FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
 
 #: Kinds of bi-realisations, the pairs of maps α, β from which the step of the series is built.

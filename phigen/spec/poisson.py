@@ -25,7 +25,7 @@ from phigen.spec.model import (
     ProductForm,
     PullbackForm,
 )
-from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, MEMBERS, SPEC_FUNCTIONS
+from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, SPEC_FUNCTIONS
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, neg
@@ -226,7 +226,7 @@ def _family(node: Scalar, sign: int, declared: Declarations) -> PoissonForm | No
         guess = did_you_mean(node.text.split("(")[0], FAMILIES) or f"names are {FAMILY_HELP}"
         return declared.reader.error(node, f"the Lie algebra {shown(node.text)} is not known", guess)
     least, dimension = FAMILIES[family]
-    if n < least or n not in MEMBERS.get(family, (n,)) or (family == "sp" and n % 2):
+    if n < least or (family == "sp" and n % 2):
         return declared.reader.error(node, f"the Lie algebra {node.text} is not available", f"names are {FAMILY_HELP}")
     size = len(declared.coordinates)
     if dimension(n) != size and not declared.incomplete:

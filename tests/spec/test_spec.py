@@ -122,9 +122,9 @@ def test_matrices_of_a_lie_algebra() -> None:
 @pytest.mark.parametrize(
     ("name", "dimension"),
     [
-        ("so(2)", 1), ("so(3)", 3), ("so(4)", 6), ("so(5)", 10), ("se(2)", 3), ("se(3)", 6), ("sl(2)", 3),
-        ("sl(3)", 8), ("gl(1)", 1), ("gl(2)", 4), ("su(2)", 3), ("su(3)", 8), ("sp(2)", 3), ("sp(4)", 10),
-        ("sp(6)", 21), ("heisenberg(1)", 3), ("heisenberg(2)", 5), ("aff(1)", 2),
+        ("so(2)", 1), ("so(3)", 3), ("so(4)", 6), ("so(5)", 10), ("se(2)", 3), ("se(3)", 6), ("se(4)", 10),
+        ("sl(2)", 3), ("sl(3)", 8), ("gl(1)", 1), ("gl(2)", 4), ("su(2)", 3), ("su(3)", 8), ("sp(2)", 3), ("sp(4)", 10),
+        ("sp(6)", 21), ("heisenberg(1)", 3), ("heisenberg(2)", 5), ("aff(1)", 2), ("aff(2)", 6),
     ],
 )  # fmt: skip
 def test_dimension_of_a_family_is_the_number_of_coordinates(name: str, dimension: int) -> None:
