@@ -89,7 +89,9 @@ def first_numbers(compilation: Compilation) -> dict[str, int]:
 
 
 def _kinds(compilation: Compilation) -> dict[str, list[Variable]]:
-    """Return the variables of each kind, such as "STATE"; kinds and variables are in the order of the numbers."""
+    """Return the variables by kind, such as "STATE". The order of the result determines the numbers of the
+    variables.
+    """
     spec, program = compilation.spec, compilation.program
     run = first_run(spec)
     return {
