@@ -27,10 +27,11 @@ _LANES = ir.Pointer(constant=False, lanes=True)
 class FlowFunctions:
     """The functions of the flows of a splitting, for a single trajectory.
 
-    A flow updates an array of ``along`` values. The first ``dimension`` values are the coordinates. With a monitor, two
-    further values follow: the physical time of the step, and a sum of square roots that is NaN if the step is not
-    defined (`phigen.scheme.logarithmic`). With ``turns``, a flow also updates the attitude, a group element. With
-    ``stores``, the state is stored on a tape before each flow.
+    A flow updates an array, and ``along`` is the length of this array. The first entries of the array are the
+    coordinates, and ``dimension`` is their number. With a monitor, two further entries follow: the physical time of the
+    step, and a sum of square roots that is NaN if the step is not defined (`phigen.scheme.logarithmic`). With
+    ``turns``, a flow also updates the attitude, a group element. With ``stores``, the state is stored on a tape before
+    each flow.
     """
 
     dimension: int
@@ -131,9 +132,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow(part, row)`` yields the statements of one flow, whose coefficients are in the row ``row``. ``rows`` is a
-    variable of the generated code. If ``size`` is None, it is the number of the row of the next flow. Otherwise it is
-    the address of this row, and each row has ``size`` coefficients.
+    ``flow(part, row)`` yields the statements of one flow, whose coefficients are in the row ``row``. The generated code
+    has a variable ``rows``, which refers to the row of the next flow. If ``size`` is None, the variable holds the
+    number of this row. Otherwise the variable holds the address of this row, and each row has ``size`` coefficients.
     """
 
     def further(count: int) -> ir.Value:

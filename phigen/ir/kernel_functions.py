@@ -1,7 +1,8 @@
-"""Builder of the functions of kernels: straight-line code that reads entries of arrays, and stores results to arrays.
+"""Builder of the functions of kernels: straight-line code that reads entries of arrays, and stores results to
+arrays.
 
-The functions are on the level of memory (`phigen.ir.nodes`). The passes `zeros`, `output_order`, `cutting` and
-`simd_lanes` of `phigen.ir.passes` change these functions before they are printed.
+The functions need no lowering. The passes `zeros`, `output_order`, `cutting` and `simd_lanes` of `phigen.ir.passes`
+change the functions before they are printed.
 """
 
 from __future__ import annotations

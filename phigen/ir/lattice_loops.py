@@ -59,7 +59,8 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:
-        """Return the function of the kernel of an observable: a density, an energy or the vector field.
+        """Return the function that evaluates a kernel at all sites and stores the results for the caller. The kernel
+        computes a density, an energy or the vector field.
 
         The energy at a site includes one half of the energy of each bond or pair to which the site belongs.
         """
@@ -93,8 +94,8 @@ class LatticeLoops:
         """Return the function of a transposed kernel. The original kernel belongs to a ``sweep`` or, without ``sweep``,
         to a stage.
 
-        ``gather`` has the sums that the transposed kernel reads. By the inverse flow, the transposed kernel also
-        recomputes the values of ``fields`` before the sweep.
+        ``gather`` has the sums that the transposed kernel reads. The list ``fields`` has names of fields: the function
+        also recomputes the values that these fields had before the sweep.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))

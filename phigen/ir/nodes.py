@@ -336,8 +336,8 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Store:
-    """Assignment of a value to an element of an array at the site of the loop or, if it ``adds``, addition to this
-    element.
+    """Change of an array element at the site of the loop. If ``adds`` is true, the value is added to the element.
+    Otherwise the value replaces the element.
 
     With ``extreme`` "max", the value replaces the element only if the value is larger; with "min", only if the value is
     smaller. ``offset`` and ``end`` select an element at another site, as in `Load`.
@@ -378,7 +378,9 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """Assignment of a value to a place in memory and to all places in ``too``. If it ``adds``, the value is added."""
+    """Assignment of a value to a place in memory. If ``adds`` is true, the value is added to the value that the place
+    holds. The field ``too`` lists further places that receive the same value.
+    """
 
     target: Value
     value: Value
@@ -444,8 +446,8 @@ ALL_SITES = Selection()
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop over sites, bonds or pairs. On the level of memory, the ``variable`` counts from ``low`` on and stays below
-    ``high``.
+    """Loop over sites, bonds or pairs. After the lowering, the loop has a counter, whose name is ``variable``. The
+    first value of the counter is ``low``, and all values are less than ``high``.
 
     ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
     "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
@@ -487,7 +489,9 @@ class Discard:
 
 @dataclass(frozen=True)
 class If:
-    """Statements that are executed if a condition is true. The statements ``otherwise`` are executed if it is false."""
+    """Branch. The statements in ``then`` are executed if ``condition`` is true. The statements in ``otherwise`` are
+    executed if ``condition`` is false.
+    """
 
     condition: Value
     then: Block
@@ -563,7 +567,7 @@ Statement = (
 Block = tuple[Statement, ...]
 
 
-#: Parameters of functions on the level of sites. Each target has its own names for these parameters.
+#: Parameters of functions before the lowering. Each target has its own names for these parameters.
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
@@ -598,8 +602,8 @@ class Function:
     """Function of the generated code.
 
     ``doc`` is printed as the comment of the function. If the function evaluates a kernel, ``role`` is the role of this
-    kernel. ``returns`` is the type of the result. On the level of sites, the parameters are some of `PARAMETERS`. On
-    the level of memory, the types of parameters are in ``types`` or else in `TYPES`.
+    kernel. ``returns`` is the type of the result. Before the lowering, each parameter is one of `PARAMETERS`. After the
+    lowering, each parameter has a type, which is listed in ``types`` or in `TYPES`.
     """
 
     name: str

@@ -49,7 +49,9 @@ class PathLayout:
         return ir.entry(P, i)
 
     def fixed(self, i: int) -> ir.Value:
-        """Return value number ``i`` among the values that are constant along a path."""
+        """Return the array element for one of the values that are constant along a path; ``i`` is the number of the
+        value.
+        """
         return ir.entry(F, i)
 
     def series(self, i: int) -> ir.Value:
@@ -75,7 +77,7 @@ class PathFunctions:
 
     @property
     def derived(self) -> list[tuple[int, NodeSeries]]:
-        """The series of all nodes except the coordinates, each with its number."""
+        """A list of pairs for all nodes except the coordinates: the number of the node, and its Taylor series."""
         return [*enumerate(self.path.series)][self.program.dimension :]
 
     def blocks(self) -> dict[str, ir.Function]:
@@ -204,12 +206,14 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
 
 
 def tangent_program(program: Program) -> Program:
-    """Return the program with the coordinates of a tangent path: the state and its variation."""
+    """Return a copy of the program, with the coordinates of a tangent path: the state and its variation."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def adjoint_program(program: Program, path: PathAdjoint) -> Program:
-    """Return the program with the coordinates of the path in the reverse pass: the state and all cotangents."""
+    """Return a copy of the program, with the coordinates of a path in the reverse pass: the state and all
+    cotangents.
+    """
     names = program.coordinates
     bars = [
         *map(cotangent, names),
@@ -308,12 +312,14 @@ class _LaneFunctions:
         doc = f"Coefficient k >= 1 of {purpose}: first convolutions over the orders between 0 and k, then all other"
         return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
-    def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
+    def variation(
+        self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, description: str
+    ) -> ir.Function:
         """Return the function that adds a product to the derivatives of the path. One factor is ∂(π p)/∂m at order j;
         the other factor is the derivatives of the path at order k − j.
 
-        The derivatives are matrices with ``width`` columns, in the member ``array`` of the record ``e``. ``whose``
-        describes the derivatives in the comment.
+        The derivatives are matrices with ``width`` columns, in the member ``array`` of the record ``e``. The text
+        ``description`` names the derivatives in the comment of the generated function.
         """
         statements = list[ir.Statement]()
         for e in jacobian:
@@ -327,23 +333,23 @@ class _LaneFunctions:
                     ir.Assign(_in_lane(ir.entry(TO, row * width + k)), ir.joined("+", *products), adds=True)
                 )
         before = ir.Entry(ir.Member(E, array), ir.Binary("-", K, J))
-        doc = f"Contribution of order j of d(pi p)/dm to order k + 1 of {whose}"
+        doc = f"Contribution of order j of d(pi p)/dm to order k + 1 of {description}"
         return _of_order(name, doc, ("e", "j", "k"), array, statements, {FROM: before})
 
     def source(
-        self, name: str, array: str, entries: Sequence[tuple[int, ir.Value, SeriesEntry]], whose: str
+        self, name: str, array: str, entries: Sequence[tuple[int, ir.Value, SeriesEntry]], description: str
     ) -> ir.Function:
-        """Return the function that adds terms of order k to derivatives of the path, one term for each of
-        ``entries``.
+        """Return the function that adds one term for each item of ``entries`` to the derivatives of the path.
 
-        Each of ``entries`` is a triple: the index of the derivative, a factor, and an element of one of the matrices
-        ∂(π p)/∂m, π and ∂(π p)/∂c, where c is a coefficient.
+        An item has the index of a derivative, a factor, and a matrix entry. The term is the factor times the Taylor
+        coefficient of order k of the matrix entry. `PathSlopes` defines the derivatives and the matrices: ∂(π p)/∂m, π,
+        and ∂(π p)/∂c for coefficients c. For ``description`` see `variation`.
         """
         statements = [
             ir.Assign(_in_lane(ir.entry(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
             for i, factor, e in entries
         ]
-        doc = f"Contribution of order k of the entries of pi to order k + 1 of {whose}"
+        doc = f"Contribution of order k of the entries of pi to order k + 1 of {description}"
         return _of_order(name, doc, ("e", "k"), array, statements, {})
 
 
@@ -355,8 +361,10 @@ def _of_order(
     statements: Sequence[ir.Statement],
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
-    """Return a function whose ``statements``, in a loop over lanes, add terms of order k + 1 to derivatives of the
-    path.
+    """Return a function that adds terms to Taylor coefficients of derivatives of the path. The order of these
+    coefficients is k + 1, where k is an argument of the function.
+
+    The body is a loop over lanes, and ``statements`` is the body of this loop.
     """
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (

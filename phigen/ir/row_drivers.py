@@ -212,7 +212,9 @@ class _Driver:
 
 
 def at(sites: Sites) -> ir.Value:
-    """Return the argument by which a call receives a row segment or, unless ``sites`` is None, these sites of it."""
+    """Return the argument that passes a row segment to a loop. If ``sites`` is not None, the loop runs only over these
+    sites of the segment.
+    """
     return ir.Called("between", (SEGMENT, *sites)) if sites else SEGMENT
 
 

@@ -183,7 +183,9 @@ class RowDeclarations:
                     self._at_end(name, pointer, load)
 
     def _at_end(self, name: str, pointer: ir.Value, load: ir.Load) -> None:
-        """Record the declaration of a value at the site of the loop, or at the other end of a bond or pair."""
+        """Record the declaration of the variable ``name``. The variable has the value at the site of the loop or, in
+        loops over bonds or pairs, the value at the other site.
+        """
         if not load.end:
             self.loaded[name] = ir.Entry(pointer, SITE)
         elif load.end == self.reading.here:
@@ -252,7 +254,7 @@ class RowDeclarations:
 
 
 def rows_of(function: ir.Function, layout: RowLayout, reading: Reading | None = None) -> RowDeclarations:
-    """Return the declarations of the values that a function on the level of sites reads."""
+    """Return the declarations of the values that a function reads. The function is not lowered yet."""
     rows = RowDeclarations(layout, reading or Reading())
     return rows.read((*function.body, *function.loop.body))
 
@@ -282,7 +284,9 @@ def _member(array: ir.Array) -> ir.Value:
 
 
 def gathered(number: int) -> ir.Value:
-    """Return the array of sum ``number`` over bonds or pairs."""
+    """Return the array of a sum over bonds or pairs, with one entry for each site. ``number`` is the number of
+    the sum.
+    """
     return ir.entry(ir.Member(SOLVER, "gathered"), number)
 
 

@@ -36,14 +36,14 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: _ARRAYS has the names of arrays in JavaScript, by kind of storage. _PARAMETERS has the parameters of functions that
-#: have another name in JavaScript.
+#: _ARRAYS has the names of arrays in JavaScript, by kind of storage. _PARAMETERS maps names of parameters to their
+#: names in JavaScript, if the two names differ.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
 
 def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a function of a lattice, lowered from the level of sites to the level of memory (`phigen.ir.nodes`)."""
+    """Return the lowered form of a function of a lattice."""
     parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
     if not any(isinstance(s, ir.Store) for s in statements(function.body)):
         return replace(function, parameters=parameters, body=())
@@ -69,7 +69,7 @@ class _Tables:
         return ir.fixed("params") if "params" in self.function.parameters else ir.Member(SITES, "params")
 
     def lowered(self) -> ir.Function:
-        """Return the function on the level of memory."""
+        """Return the lowered function."""
         calls: list[ir.Statement] = []
         loops: list[ir.Statement] = []
         for s in self.function.body:

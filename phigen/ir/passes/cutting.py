@@ -92,6 +92,6 @@ def _declared(statements: Sequence[ir.Statement]) -> list[str]:
 
 
 def _symbols(statements: Sequence[ir.Statement]) -> list[str]:
-    """Return the symbols in the expressions of statements, operands before the expressions that read them."""
+    """Return the symbols that occur in statements, in the order of their first use."""
     graphs = [v for v in values(tuple(statements)) if isinstance(v, Expression)]
     return [e.value for e in topological(graphs) if e.op == "symbol"]

@@ -1,5 +1,4 @@
-"""Lowering of functions on the level of sites to row functions: sweeps, stages, observables, and sums over bonds or
-pairs.
+"""Lowering to row functions: sweeps, stages, observables, and sums over bonds or pairs.
 
 A row function runs over the sites of a row segment; see `phigen.ir.passes.by_rows`.
 """
@@ -115,10 +114,10 @@ def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *
 def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
-    """Return a row function that stores its results in the arrays to which the member ``member`` of the row record
-    points.
+    """Return a row function that stores its results in arrays. The row record has pointers to these arrays, in a list
+    whose name is ``member``.
 
-    ``names`` maps the number of each array to the name of the pointer to this array.
+    ``names`` maps the number of each array to the name of a local pointer to this array.
     """
     rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
@@ -130,12 +129,14 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its row function.
+    """A function that sums over the bonds or pairs of a site, and the names of additional arguments of its row
+    function.
 
-    ``oriented`` are the parameters at bonds that change sign for the site at the end b. There are three additional
-    arguments: ``at_bonds``, the arrays of parameters at bonds; ``sign``, the direction of a bond at the site where it
-    begins, 1 or −1; and ``across``. If ``across`` is 1, the function omits bonds whose other site does not have the
-    colour of the sweep. If ``across`` is 0, it omits bonds if the site of the loop does not have this colour.
+    ``oriented`` lists parameters at bonds. The sign of these parameters changes if the site of the loop is the end b of
+    the bond. The field ``arguments`` may contain three names. ``at_bonds`` is the array of parameters at bonds.
+    ``sign`` is the direction of a bond at the site where the bond begins, 1 or −1. ``across`` says which site of a bond
+    must have the colour of the sweep: the other site if ``across`` is 1, the site of the loop if ``across`` is 0. The
+    function omits all other bonds.
     """
 
     function: ir.Function
@@ -263,9 +264,10 @@ def bonds_of(
     """Return the loop over the bonds of a site. ``loop.end`` selects the bonds that begin at the site ("a"), the bonds
     that end at the site ("b"), or all bonds of the site ("").
 
-    If ``loop.chosen`` names a site of a bond, this site must have the colour of the sweep; all other bonds are skipped.
-    With ``across``, a flag of the caller selects the site. The variable `SIDE` is the direction of the bond: ``sign``
-    at the site where the bond begins, −``sign`` at the site where it ends.
+    ``loop.chosen`` may name one of the two sites of a bond: ``here`` (the site of the loop) or ``there`` (the other
+    site). Then this site must have the colour of the sweep, and all other bonds are skipped. If ``across`` is true,
+    ``loop.chosen`` is not used; a flag of the generated code selects the site instead. The variable `SIDE` is the
+    direction of the bond: ``sign`` at the site where the bond begins, −``sign`` at the site where it ends.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
     reads_there = [(name, value) for name, value in rows.other.items() if name in names]

@@ -62,14 +62,15 @@ class Handed:
 
 @dataclass(frozen=True)
 class Transpose:
-    """A transposed function on the level of sites, and the arrays that it reads and writes.
+    """A transposed function before the lowering, and the arrays that it reads and writes.
 
     The function reads cotangents of the kind ``seed``. They are in the arrays of cotangents that belong to the fields
     with the numbers ``fields``. If ``fields`` is empty, they are in the arrays ``varied`` of the row record. First the
-    function adds the contributions ``received``, which an earlier loop has stored. It stores its own contributions to
-    neighbours in the arrays of ``handed``. ``summed`` is the number of sums over bonds or pairs that the function
-    reads; the cotangents of these sums are stored in the arrays from number ``sums_from`` on. The function also writes
-    the fields ``recomputed``.
+    function adds contributions of other sites to the cotangents. An earlier loop has stored these contributions, and
+    the field ``received`` lists them. The function stores its own contributions to other sites in arrays, and the field
+    ``handed`` lists these contributions. ``summed`` is the number of sums over bonds or pairs that the function reads;
+    the cotangents of these sums are stored in the arrays from number ``sums_from`` on. The function also writes the
+    fields of the lattice that are listed in ``recomputed``.
     """
 
     function: ir.Function
@@ -343,7 +344,8 @@ def _zero(name: str) -> ir.Declare:
 
 
 def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: ir.Pointer = WRITTEN) -> ir.Declare:
-    """Return the declaration of a pointer to array ``k`` of the field ``member`` of the record of a row segment.
+    """Return the declaration of a pointer to an array. The row record has several lists of arrays: ``member`` is the
+    name of the list, and ``k`` is the number of the array in this list.
 
     With a ``layout``, the pointer is to the first site of the segment in this array.
     """

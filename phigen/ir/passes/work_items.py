@@ -64,7 +64,9 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _WorkItems:
-    """Lowering of one function to work items; ``declared`` are the neighbours whose numbers have variables already."""
+    """Lowering of one function to work items. For each neighbour that the function reads, a variable holds the number
+    of the neighbour's site. The set ``declared`` has the neighbours whose variables are already declared.
+    """
 
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
