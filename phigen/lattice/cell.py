@@ -88,7 +88,7 @@ class Cell:
 
     @property
     def vanishing(self) -> frozenset[str]:
-        """The parameters at sites that may be 0, which are those not declared positive."""
+        """The names of those parameters at sites whose values may be 0, because they are not declared positive."""
         return frozenset(p.name for p in self.parameters if p.at == "sites" and not p.positive)
 
     @property
@@ -108,7 +108,9 @@ class Cell:
         return self.neighbours.place(name)
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return (name, offset) by symbol, for all symbols of the expressions that have a value at every site."""
+        """Return a map from symbols in the expressions to pairs (name, offset). The map contains the symbols of all
+        quantities that have a value at each site, such as fields and parameters at sites.
+        """
         return self.neighbours.places(*expressions)
 
     def shifted(self, expression: Expression, offset: Offset) -> Expression:
@@ -155,8 +157,8 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the smallest and the largest offset along each axis of the sites that an expression reads; the site
-        itself, with the offset 0, is included.
+        """Return the smallest offset along each axis and the largest offset along each axis, as two tuples. The offsets
+        are those of the sites that the expression reads, and 0 for the site itself.
         """
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))

@@ -101,11 +101,13 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 
 
 def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
-    """Return the integrals of the power P, each from the first time to another time, and an estimate of their error.
+    """Return the integrals of the power P, each from the first time to another time, and an estimate of their
+    error.
 
     ``values`` has P at equidistant times, ``h`` apart. Without ``row_positions``, the upper limits of the integrals are
     these times. Otherwise they are the entries of ``row_positions``, in units of ``h`` from the first time. An entry
-    need not be a whole number. Beyond the last value, the last polynomial is extrapolated.
+    need not be a whole number. Between two times, a polynomial through the nearest values stands for P. After the last
+    time, the polynomial through the last values is extrapolated.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())

@@ -158,8 +158,8 @@ def _of_unit_time(flow: CellFlow) -> CellFlow:
 
 
 def casimir_rate(cell: Cell, name: str) -> Expression:
-    """Return a density whose sum is dC/dt for a Casimir C. Only the vector force f contributes, since πζ preserves
-    C.
+    """Return a density whose sum is dC/dt for a Casimir C. Only the vector force f changes C. All other terms of ẋ have
+    the form πζ with a covector ζ, and preserve C.
     """
     density, kind = cell.casimirs[name]
     vector, terms = cell.forces.vector, []

@@ -50,7 +50,9 @@ _OTHER = {"a": "b", "b": "a"}
 class GraphSearch(PartSearch):
     """Search for the parts of H on a graph, whose colours are known only at run time.
 
-    A term in a part is a pair: a summand of H, and `WHOLE`, `BEGINS` or `ENDS_THERE` in place of a colour.
+    A term in a part is a pair: a summand of H, and a class. The class says where the part contains the summand:
+    `WHOLE`, at all sites or bonds; `BEGINS`, at the bonds that begin at sites of one colour; `ENDS_THERE`, at the bonds
+    that end at sites of one colour.
     """
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)
@@ -286,8 +288,8 @@ def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
 
 
 def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the derivatives of the energy of a bond with respect to the fields of ``end``, divided by the factors of
-    `sum_factors`.
+    """Return the derivatives of the energy of a bond with respect to the fields at one end of the bond, "a" or "b".
+    Each derivative is divided by the factor from `sum_factors`.
     """
     slopes = gradient(density, [cell.at(f, (end,)) for f in cell.fields])
     forces = {f: with_first_end(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero}

@@ -1,8 +1,8 @@
 """Kernels of observables of a lattice: energy, Casimirs, vector field, and the observables of the spec.
 
 The value of an observable may be one number: the sum, the mean, the maximum or the minimum of a density over the sites.
-Targets compute this number from the values of the density. Near an open end, a sum omits single terms of the density
-that reach beyond the end, as H does. A maximum or minimum omits the whole site.
+Targets compute this number from the values of the density. Near an open end, some terms of the density reach beyond the
+end. A sum omits only these terms, and so does H. A maximum or minimum omits the whole site.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from phigen.symbolic.arrays import Floats
 
-#: Largest number of sites that are placed. Time and memory grow with the square of this number, and 600 sites take some
-#: seconds.
+#: Largest number of sites for which positions are computed. Time and memory grow with the square of the number of
+#: sites, and 600 sites take some seconds.
 MOST_PLACED = 600
 #: Number of iterations of stress majorisation. Each iteration decreases the deviation of distances in the plane from
 #: numbers of bonds.

@@ -320,8 +320,8 @@ def _any(cell: Cell) -> str:
 
 
 def _representative_systems(cell: Cell) -> Iterator[tuple[str, System]]:
-    """Yield systems that represent all graphs, or all numbers of sites that interact in pairs, each with a
-    description.
+    """Yield pairs (description, system). A statement that is true for all these systems is true for every graph or, if
+    sites interact in pairs, for every number of sites.
     """
     graphs: Sequence[tuple[int, Sequence[tuple[int, int]]]] = [(1, ()), (2, ())]
     if cell.relation == "graph":

@@ -54,7 +54,8 @@ class _OtherFormError(Exception):
 
 @dataclass(frozen=True)
 class LatticeBodies:
-    """Attracting bodies at the sites of a cell, in the relative coordinates named ``change``.
+    """Attracting bodies at the sites of a cell, in relative coordinates. ``change`` is the name of the coordinates:
+    "jacobi" or "democratic_heliocentric".
 
     ``axes`` pairs each position with its momentum if ``momenta`` is true, else with its velocity. ``mass`` is the name
     of the parameter at sites, and ``gravity`` is the constant γ in the energies −γ m_i m_j/|q_i − q_j|.
@@ -116,10 +117,10 @@ class LatticeBodies:
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:
-        """Return the flow of the remainder B = H − A, where A has the Kepler motions.
+        """Return the flow of the remainder B = H − A, where A is the Hamiltonian of the Kepler motions.
 
-        The attribute ``hamiltonian`` of the flow has the energy of a pair of bodies. In Jacobi coordinates, the energy
-        of attraction in the Kepler motion of a body is subtracted.
+        The attribute ``hamiltonian`` of the flow is the energy of attraction between two bodies. In Jacobi coordinates,
+        the energy of attraction in the Kepler motion of a body is subtracted from this energy.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
@@ -159,8 +160,9 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
     """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    In democratic heliocentric coordinates, B moves all positions with the velocity Σ m_j V_j/m_0. In these coordinates,
-    sweeps that compute sums over pairs also compute this velocity.
+    In democratic heliocentric coordinates, the remainder of H moves all positions with the velocity Σ m_j V_j/m_0,
+    where body j has the mass m_j and the relative velocity V_j. In these coordinates, sweeps that compute sums over
+    pairs also compute this velocity.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 

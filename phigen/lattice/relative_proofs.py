@@ -150,7 +150,7 @@ class _FewBodies:
                 yield f"q_{i} - q_0", q[i][k] - q[0][k] - symbol(n)
 
     def remainder(self) -> Expression:
-        """Return the remainder B = H − A, where A has the Kepler motions, as a function of the relative coordinates."""
+        """Return the remainder B = H − A in relative coordinates, where A is the Hamiltonian of the Kepler motions."""
         gravity, m, q = self.bodies.gravity, self.masses, self.cartesian("Q")
         pairs = [(i, j) for i, j in combinations(range(self.count), 2) if self.bodies.jacobi or i > 0]
         energies = (

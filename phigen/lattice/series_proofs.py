@@ -2,8 +2,9 @@
 
 The axioms of the bi-realisation (α, β) are proved at one site if all brackets are between fields of one site. Otherwise
 they are proved on a periodic box. If brackets couple sites up to the distance r along an axis, the box has 4r + 1 sites
-along this axis. The sites that α reads at two sites with the distance 2r do not reach around this box. At larger
-distances, α reads different sites. So the proof holds for every larger box, by translation.
+along this axis. The proof holds for every larger box, for two reasons. First, α at two sites with a distance of at most
+2r reads at most 4r + 1 adjacent sites. The box has room for these sites without an overlap. Second, α at two sites with
+a larger distance reads no site twice.
 
 Two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p = h∇H
 the increment is hπ∇H up to O(h²). Since a stage is also symmetric, its order is 2.

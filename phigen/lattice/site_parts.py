@@ -141,10 +141,11 @@ class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
     The ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or
-    pairs. ``gathered`` lists the sums; symbols of the kind `GATHERED` stand for them. ``solution`` has these increments
-    with symbols of the kind `FORCE`, which stand for the components of the gradient of the part. The increments in
-    ``solution`` solve ẋ = ``rates``. For damping, ``components`` has the values of the symbols of the kind `FORCE`,
-    since the force is not the gradient of a part. ``manner`` describes the motion in words.
+    pairs. ``gathered`` lists the sums; symbols of the kind `GATHERED` stand for them. ``solution`` has the same
+    increments in another form, in which symbols of the kind `FORCE` stand for the components of the force. The force is
+    the gradient of the part or, for damping, a covector. The increments in ``solution`` solve ẋ = ``rates``. For
+    damping only, ``components`` maps the symbols of the force to its components. ``manner`` describes the motion in
+    words.
     """
 
     colour: int | None
@@ -350,8 +351,8 @@ class PartSearch:
     def _summands(self, term: Summand) -> list[Summand]:
         """Return the term as a list of summands.
 
-        The list has one entry, except if the term mixes coordinates of different sites that do not commute. Then the
-        list has the monomials of the term.
+        The list has one entry if the term depends on a single site, or if copies of the term at sites of one colour
+        commute. Otherwise the list has the monomials of the term.
         """
         if self._classes(term) or self._is_single_site(term):
             return [term]

@@ -505,7 +505,7 @@ def _gather(
 
 
 def _others(cell: Cell) -> str:
-    """Return in words with which sites a site has bonds or pairs."""
+    """Return the words that stand for the partners of a site in a comment: "its neighbours" or "all other sites"."""
     return "its neighbours" if cell.relation == GRAPH else "all other sites"
 
 
