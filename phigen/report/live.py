@@ -217,10 +217,10 @@ def slid(slider: Slider) -> Markup:
 
 
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
-    """Return the texts of the two halves of the panel, for phigen and for RK4.
+    """Return a tuple for each half of the panel: one for phigen, one for RK4.
 
-    Each entry has the colour (as a number), the id of the canvas, the name of the method, and the id and the text of
-    the label.
+    A tuple has the number of the colour, the id of the canvas, the name of the method, and two texts for the label: its
+    HTML attribute ``id=…`` and its content.
     """
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),

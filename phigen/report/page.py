@@ -67,7 +67,9 @@ def heading(text: str) -> Markup:
 
 
 def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Sequence[Cell]]], kind: str = "") -> Markup:
-    """Return a table with row headers; ``columns`` includes the name of the first column, ``kind`` is a class."""
+    """Return a table with row headers. ``columns`` has the headers of all columns, including the column of row headers.
+    ``kind`` is the CSS class of the table.
+    """
     return block("table", caption=caption, columns=columns, rows=rows, kind=kind)
 
 

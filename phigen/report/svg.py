@@ -1,8 +1,8 @@
 """Figures of matplotlib as parts of a page.
 
-Colours become variables of the style sheet of the page, so that they follow its theme. Ids become unique. The
-Content-Security-Policy of the page forbids style attributes and style elements, so each style becomes an attribute of
-SVG, such as fill or stroke.
+Colours are replaced by variables of the style sheet, so that a figure follows the theme of the page. Ids become unique.
+The Content-Security-Policy of the page forbids style attributes and style elements, so each style becomes an attribute
+of SVG, such as fill or stroke.
 """
 
 from __future__ import annotations
