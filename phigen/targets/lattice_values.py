@@ -1,4 +1,4 @@
-"""Template values and switches for lattices that are common to all languages."""
+"""Values and switches that the templates for lattices need, in every language."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
 
 
 def switches(step: Sweeps) -> dict[str, bool]:
-    """Return the switches for lattices that the runtimes of all languages have, by name."""
+    """Return a map from the names of switches for lattices to their values. The runtime of every language has these
+    switches.
+    """
     return {
         "COLOURS": step.sites.colours > 1,
         "SEAMS": bool(step.sites.seams),

@@ -15,7 +15,8 @@ _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """Return the policies of a program, by the name of the runtime file with their constants.
+    """Return the numerical constants of the runtime for a program. The result maps the name of a runtime file to the
+    constants that the file defines.
 
     If coordinates keep their signs during a step, errors are measured relative to each coordinate.
     """

@@ -31,7 +31,9 @@ class StateBlock:
     copied: tuple[str, ...] = ()
 
     def save(self) -> Iterator[str]:
-        """Yield statements that copy ``saved`` members to local variables before a step."""
+        """Yield the statements that copy members of the struct to local variables before a step. The field ``saved``
+        lists these members.
+        """
         arrays = [f"{member}[{size}]" for member, size in self.saved if size]
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []
@@ -39,14 +41,14 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """Yield statements that copy the local variables back to the ``saved`` members."""
+        """Yield the statements that copy the local variables back to the members in the list ``saved``."""
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 
 
 _COEFFICIENTS = "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];"
 
-#: Blocks in the order of the members of the struct.
+#: The members of the struct of a solver, in blocks. The struct declares its members in this order.
 STATE = (
     StateBlock(
         "x",

@@ -128,9 +128,8 @@ class Amalgam:
         return holds(condition.replace("PHI_", ""), self.switches)
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
-        """Return lines that were printed for the solver, with its number type and with macros expanded.
-
-        Names in the lines are not changed.
+        """Return printed lines with phrases replaced by their texts. The lines were printed for this solver: they
+        already have its number type and its names.
         """
         named = lines_with("\n".join(lines), _PHRASES)
         spelt_lines: list[str] = []

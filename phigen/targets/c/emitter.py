@@ -107,7 +107,8 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
 
 
 def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
-    """Return the headers with the constants of policies, by file name.
+    """Return headers that define constants of the solver, such as tolerances and limits of iterations. The result maps
+    file names to texts.
 
     Sizes of arrays are left out, since they are declared with the struct of the solver. ``staged`` is true for Gauss
     methods with their stages in lanes.

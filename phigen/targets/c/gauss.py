@@ -15,9 +15,9 @@ from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
 #: Threshold for the end of sweeps in single precision; `phigen.targets.c.real.threshold` converts this number to 1e-9.
-#: Relative to the rounding error of its precision, 1e-9 is about as large as 2e-18, the threshold in double precision.
-#: If 2e-18 were converted, the threshold would be larger, and the energy error of 1e5 steps of Hénon–Heiles would be
-#: 2e-5 instead of 5e-7.
+#: The converted threshold is about 1/60 of the rounding error of single precision. In double precision the threshold is
+#: 2e-18, about 1/60 of the rounding error of double precision. If 2e-18 were converted, the result would be 1e-8, and
+#: the energy error of 1e5 steps of Hénon–Heiles would be 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
 #: Threshold for the end of sweeps if the stages of a method are in a loop, not in lanes. It was chosen for the

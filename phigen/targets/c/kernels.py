@@ -166,7 +166,7 @@ def _through_exponentials(program: Program, kernel: Kernel) -> str:
 
 
 def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: bool = False) -> str:
-    """Return the declaration of the exported function that `function` defines for a kernel."""
+    """Return the declaration of the exported C function of a kernel."""
     form = Form(f"{program.name}_{name or kernel.name}", exported=True, returning=returning)
     return f"{_signature(program, kernel, form)};"
 

@@ -18,9 +18,9 @@ from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
 from phigen.targets.c.kernels import function
 
-#: Predictors fit linear recurrences to past solutions. WINDOW is a multiple of 8: the number of past values from which
-#: a recurrence computes the next value. FITTED is the number of values to which the recurrence is fitted. For large
-#: systems, 112 values would need too much memory; the number is then smaller, but at least SMALLEST.
+#: Predictors fit linear recurrences to past solutions. WINDOW is the number of past values from which a recurrence
+#: computes the next value; WINDOW is a multiple of 8. FITTED is the number of values to which the recurrence is fitted.
+#: For large systems, 112 values would need too much memory; the number is then smaller, but at least SMALLEST.
 WINDOW, FITTED, SMALLEST = 40, 112, 32
 
 #: Largest number of past values that a solver stores for its recurrences: 64 kB in double precision.

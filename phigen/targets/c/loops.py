@@ -90,7 +90,7 @@ def commented(printed: ir.Function, program: Program, linkage: str = "static") -
 
 
 def table(printed: ir.ConstantTable, program: Program) -> str:
-    """Return a table of integers of a solver as one line of C."""
+    """Return the declaration of a constant array of integers, as one line of C."""
     number = printed.length or ir.Constant(len(printed.values))
     length = _spelling(ir.Function("", "", Role.OTHER, (), ()), program)(number)
     return f"static const int {program.name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: Blocks of the struct of a lattice, in the order of its members. The statements in ``reset`` place arrays in the
-#: memory of the solver.
+#: The members of the struct of a lattice, in blocks. The struct declares its members in this order. The statements in
+#: ``reset`` place arrays in the memory of the solver.
 LATTICE = (
     StateBlock(
         "sizes",

@@ -161,7 +161,9 @@ _VERSIONS = {f: f + OWN for f in FLOW_FUNCTIONS}
 
 
 def _flow(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
-    """Return the kernel of a flow without increments that are zero, and the indices of the values that it updates."""
+    """Remove all increments that are zero from the kernel of a flow. Return the new kernel, and the indices of the
+    values that the flow updates.
+    """
     increment = kernel.outputs[0].values
     updated = [i for i, e in enumerate(increment) if not e.is_zero]
     output = Output("change", tuple(increment[i] for i in updated))

@@ -11,8 +11,8 @@ from typing import NamedTuple
 class TokenKind(StrEnum):
     """The kinds of tokens.
 
-    ``MARK`` is a character of an operator or a bracket; tokens of `lexemes` have whole operators. ``SPACE`` is any
-    white space. ``DIRECTIVE``, from `lexemes` only, is a line of the preprocessor.
+    ``MARK`` is a bracket or an operator. An operator of several characters is one token in `lexemes`, but several
+    tokens in `tokens`. ``SPACE`` is any white space. ``DIRECTIVE``, from `lexemes` only, is a line of the preprocessor.
     """
 
     COMMENT = "comment"
@@ -97,10 +97,12 @@ def next_token(text: str, at: int) -> re.Match[str] | None:
     return match
 
 
-def closing_brace(text: str, at: int) -> int:
-    """Return the position of the brace that closes the brace at ``at``, or the end of the text."""
+def closing_brace(text: str, begin: int) -> int:
+    """Return the position of the brace that closes the brace at position ``begin``; the length of the text if no brace
+    does.
+    """
     depth = 0
-    for match in _BRACES.finditer(text, at):
+    for match in _BRACES.finditer(text, begin):
         depth += (match[0] == "{") - (match[0] == "}")
         if depth == 0 and match[0] == "}":
             return match.start()

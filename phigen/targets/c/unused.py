@@ -90,7 +90,9 @@ def functions_of(lines: Sequence[str]) -> Iterator[Function]:
 
 
 def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
-    """Yield all declarations and definitions outside functions; the name is "" unless a function is declared."""
+    """Yield all declarations and definitions outside functions. A declaration of anything but a function has the name
+    "".
+    """
     text, declaration, at = "\n".join(lines), _Declaration(), 0
     line_ends = [*accumulate(len(line) + 1 for line in lines)]
     while token := next_token(text, at):
@@ -126,7 +128,9 @@ class _Declaration:
     has_body: bool = False
 
     def take(self, token: str, place: int) -> None:
-        """Process the next token. Tokens inside braces are left out by the caller; the opening brace is passed."""
+        """Process the next token, which begins at ``place`` in the text. The caller skips all tokens inside braces, but
+        not the opening brace.
+        """
         if not self.first:
             self.first, self.begin = token, place
             self.is_plain = token in _NO_FUNCTIONS or not token[:1].islower()

@@ -27,8 +27,8 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the generated file by its name. Raises `SpecError` if the program needs something that the target
-    lacks.
+    """Return a map from the name of the generated file to its text. Raises `SpecError` if the program needs something
+    that the target lacks.
     """
     expect_offered(program)
     body = _lattice(program, program.step.swept) if program.step.swept else _system_of_coordinates(program)

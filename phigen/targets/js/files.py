@@ -14,7 +14,8 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Modules for systems that are no lattices, in the order of printing, each with its condition on switches.
+#: Modules for systems that are no lattices, in the order of printing. The values are conditions: a solver has the
+#: module if the condition holds for its features. The condition "" always holds.
 MODULES = {
     "errors": "",
     "march": "",
@@ -99,7 +100,7 @@ MODULES = {
     "linear": "IMPLICIT",
 }
 
-#: Modules for lattices, in the order in which they are printed, each with its condition on switches.
+#: Modules for lattices, in the order of printing. The values are conditions, as in MODULES.
 LATTICE_MODULES = {
     "errors": "",
     "march": "",
@@ -127,7 +128,8 @@ LATTICE_MODULES = {
     "site_tangent": "!SPLIT && TANGENT",
 }
 
-#: Modules that contain members of the class Solver, by the suffix NAME of their names, each with its condition.
+#: Modules `members_NAME`, which contain members of the class Solver. The keys are the NAMEs. The values are conditions:
+#: a solver has the module if the condition holds for its features.
 MEMBERS = {
     "constants": "OBSERVED",
     "attitude": "ATTITUDE",

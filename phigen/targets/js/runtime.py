@@ -26,7 +26,9 @@ PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool], policies: Mapping[str, Policy]) -> str:
-    """Return the text of all modules. It begins with the constants of the policies that the modules import."""
+    """Return the text of all modules. The text begins with groups of constants: those items of ``policies`` that the
+    modules import.
+    """
     lines = {name: _lines(name, features) for name in modules}
     imported = {match[1]: None for each in lines.values() for line in each if (match := _IMPORT.fullmatch(line))}
     constants = [JAVASCRIPT.text(policies[name]) for name in imported if name in policies]

@@ -44,7 +44,8 @@ class StateFields:
     arguments: tuple[str, ...] = ()
 
 
-#: Blocks of systems that are no lattices, in the order of the fields of the class.
+#: The fields of the class Solver, in blocks, for systems that are no lattices. The class declares its fields in this
+#: order.
 SOLVER = (
     StateFields(
         options=(
@@ -169,7 +170,7 @@ SOLVER = (
 )
 
 
-#: Blocks of lattices. All of their fields are options of the constructor.
+#: The options of the constructor for lattices, in blocks. The blocks of lattices have no fields.
 LATTICE = (
     StateFields(
         options=(

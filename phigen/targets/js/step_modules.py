@@ -34,8 +34,8 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """Return the constants for solving an implicit step, among them the numbers of series of a path. If the step has no
-    path, these numbers are 0.
+    """Return the declarations of the constants that an implicit step needs. Only steps along a path have the numbers of
+    Taylor series among these constants.
     """
     path, varied = step.path, step.varied_path
     return [

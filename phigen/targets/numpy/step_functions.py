@@ -32,7 +32,9 @@ class _PathOverMembers(PathLayout):
         return ir.Entry(ir.fixed("p"), ir.Several((ir.fixed(":"), ir.Constant(i))))
 
     def fixed(self, i: int) -> ir.Value:
-        """Return value number i among those that are constant along a path."""
+        """Return the variable for one of the values that are constant along a path; ``i`` is the number of the
+        value.
+        """
         return ir.fixed(f"f{i}")
 
     def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:

@@ -153,7 +153,9 @@ class _Reverse(RowLoops):
         return drivers(self)
 
     def drivers(self, parts: Sequence[Back]) -> Iterator[str]:
-        """Yield the text of the row drivers of the two traversals."""
+        """Yield the text of two C functions, one for each traversal of the sites in the reverse pass. The functions
+        call the loops for all row segments.
+        """
         step = self.layout.step
         receives = takes(self.program, step)
         find_givers: ir.Block = ()
@@ -229,7 +231,9 @@ class _Reverse(RowLoops):
                 seed, gather = "change_bar", sweep.gather
                 pulled.append(_Pulled(transposed, seed, gather, ends, before, bars, moved, undo, received, sweep))
             origin = f"the sweeps of H_{k + 1} have changed"
-            both = self._transpose_traversals(f"hand{k + 1}", origin, pulled, apart=handed_apart(program, step)[k])
+            both = self._transpose_traversals(
+                f"hand{k + 1}", origin, pulled, separate_loop=handed_apart(program, step)[k]
+            )
             along = [pair for kernel in back[k] for pair in kernel.along("site")]
             written = {layout.bar(step.sites.places[s][0]) for s, e in along if not e.is_zero}
             copied = [
@@ -262,13 +266,16 @@ class _Reverse(RowLoops):
             pulled = _Pulled(kernel, seed, read, ends, before if summed and number == 0 else ())
             yield self._transpose_traversals(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
-    def _transpose_traversals(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
-        """Return the calls of some transposed kernels for a row segment, in two traversals of the sites (see the head
-        of this file).
+    def _transpose_traversals(
+        self, name: str, origin: str, pulled: Sequence[_Pulled], *, separate_loop: bool = True
+    ) -> Back:
+        """Return the loops of transposed kernels, and their calls for a row segment in the two traversals of the sites
+        (see the head of this file).
 
-        The first traversal stores contributions to the cotangents of other sites. If ``apart``, a separate loop called
-        ``name`` adds them in the second traversal. Otherwise the next flow of the reverse pass adds them. ``whom`` is a
-        part of the comment on the loop: it says which neighbours have contributed.
+        The first traversal stores contributions to the cotangents of other sites. If ``separate_loop`` is true, the
+        second traversal has a loop that adds these contributions, and ``name`` is the name of this loop. Otherwise the
+        next flow of the reverse pass adds the contributions. The text ``origin`` says which neighbours have
+        contributed; it becomes a part of the comment on the loop.
         """
         layout, loops = self.layout, list[ir.Function]()
         first, second = list[ir.Statement](), list[ir.Statement]()
@@ -314,8 +321,8 @@ class _Reverse(RowLoops):
         near_ends = divides(tuple(first))
         for array in sorted({h.array for h in beside if h.offset[-1]}) if not layout.step.sites.open[-1] else ():
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
-        if beside and apart:
-            purpose = f"contributions to cotangents by the neighbours that {whom}"
+        if beside and separate_loop:
+            purpose = f"contributions to cotangents by the neighbours that {origin}"
             loops.append(row_transposes.handing(name, purpose, beside, self.layout))
             second.append(ir.Call(name, (SEGMENT,)))
         recomputed = sorted({f for one in pulled for f in one.recomputed})

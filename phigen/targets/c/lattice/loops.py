@@ -94,14 +94,13 @@ class RowLoops:
 
     @property
     def sites(self) -> LatticeLoops:
-        """The builder of loops on the level of sites, before they are lowered to rows."""
+        """The builder of loops before they are lowered to rows."""
         return self.layout.lattice
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """The versions of elementary functions in loops that have a single form.
-
-        These are the versions for SIMD lanes. Profiles other than ``fast`` have only those for all arguments.
+        """The versions of elementary functions that a loop with a single form calls. In the profile ``fast``, these are
+        the versions for SIMD lanes. In other profiles, these are the versions for all arguments.
         """
         return IN_LANES if self.fast else FULL_RANGE
 
@@ -118,8 +117,8 @@ class RowLoops:
         return forms_of(loops, rows.small_argument, rows.limited, self.versions)
 
     def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
-        """Yield the loop after the passes on the level of sites. In the profile ``fast``, there may be a second loop,
-        for sites near open ends.
+        """Yield the loop after all passes that come before the lowering. In the profile ``fast``, there may be a second
+        loop, for sites near open ends.
         """
         full_range_doc = f"as {self.program.name}_{loop.name}_near, for arguments of any size"
         doc = full_range_doc if form == "_full_range" else loop.doc
@@ -147,9 +146,11 @@ class RowLoops:
         return [row_loops.stage(loop, self.layout, outputs, adds=adds) for loop in loops]
 
     def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
-        """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
+        """Yield the row functions that sum over all bonds of a site, or over all pairs of the site with another
+        site.
 
-        If a sweep reads the sums (``swept``), the loops may have additional arguments, see `bond_arguments`.
+        If ``swept`` is true, a sweep reads the sums. Then the row functions may have additional arguments, see
+        `bond_arguments`.
         """
         partners = self.layout.partners
         of_parts = [sums for _, sums in partners.of_parts]

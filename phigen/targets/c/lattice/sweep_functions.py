@@ -77,7 +77,9 @@ def parameters(program: Program, step: Sweeps) -> str:
 
 
 def drivers(loops: RowLoops) -> RowDrivers:
-    """Return the builder of the row drivers of a lattice; see `phigen.ir.row_drivers`."""
+    """Return the builder of the functions that call loops for the row segments of a lattice; see
+    `phigen.ir.row_drivers`.
+    """
     by_hand = switches(loops.layout)["BY_HAND"]
     return RowDrivers(loops.layout, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
 
@@ -176,10 +178,10 @@ class _PartLoops:
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
     def _gathering(self, remainder: int, threads: int) -> str:
-        """Return the text of the row driver for sums over pairs of bodies in relative coordinates.
+        """Return the text of the function that computes sums over pairs of bodies in relative coordinates.
 
-        ``remainder`` is the index of the part of H that reads the sums. If ``threads`` is not 0, the driver uses
-        several threads for lattices of more than ``threads`` sites.
+        The flow of one part of H uses these sums, and ``remainder`` is the index of this part. If ``threads`` is not 0,
+        the function uses several threads for lattices of more than ``threads`` sites.
         """
         layout, program = self.loops.layout, self.loops.program
         gathers = [sweep.gather for sweep in self.parts[remainder] if sweep.gather]
@@ -207,8 +209,8 @@ class _PartLoops:
             calls_of_forms[form] = []
             for sweep in part:
                 calls = [*self._calls(sweep, form, versions)]
-                # If there are transposes, sweeps with sums do not share a loop, since the transposes have separate
-                # loops for sums.
+                # In solvers with gradients, a sweep that reads sums does not share the loop of another sweep, since the
+                # reverse pass has separate loops for the sums of each sweep.
                 for order in () if sweep.gather and layout.step.adjoint else tried:
                     other = turned(layout.step.sites, fields, order, sweep)
                     for k, call in enumerate(self._calls(other, form, versions) if other else ()):
@@ -250,8 +252,8 @@ class _PartLoops:
             yield _Call(loop, sites, colour=colour, window=window, shared=shared + end)
 
     def _segment(self, k: int, forms: Mapping[str, Sequence[_Call]], names: Names) -> RowSegment:
-        """Return the statements that apply the flow of part ``k`` to a row segment; ``names`` has the names of loops by
-        their code.
+        """Return the statements that apply the flow of part ``k`` to a row segment. ``names`` maps the code of a loop
+        to the name of the loop.
         """
         layout, coloured = self.loops.layout, self.loops.layout.step.by_colour
         setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
@@ -270,7 +272,7 @@ class _PartLoops:
 
 
 def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Block], list[_Call]]:
-    """Return the calls of all loops, by the code of the loop.
+    """Return a map from the code of each loop to the calls of loops with this code.
 
     If an earlier loop can do the work of a loop, the earlier loop is called instead.
     """
@@ -328,8 +330,8 @@ def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]
 
 
 def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays with pointers to the parameters at bonds, one array for each order in
-    ``used``.
+    """Yield the declarations of arrays with pointers to the parameters at bonds. Each nonempty tuple in ``used`` is the
+    order of the parameters in one array.
     """
     listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
@@ -337,8 +339,8 @@ def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir
 
 
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays with pointers to fields and to parameters at sites, one array for each order in
-    ``used``.
+    """Yield the declarations of arrays with pointers to fields and to parameters at sites. Each nonempty tuple in
+    ``used`` is the order of the fields in one array.
     """
     for order in dict.fromkeys(order for order in used if order):
         increments = turned_increments(layout.step.sites, layout.lattice.arrays, order)
@@ -367,9 +369,10 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
 
 
 def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
-    """Yield the text of the loops, and of the row driver, of a kernel of a stage.
+    """Yield the text of the loops that evaluate a kernel of a stage, and of the function that calls the loops for a row
+    segment.
 
-    If ``end`` is passed, the row driver also applies this kernel, which updates x at the end of a stage.
+    If the kernel ``end`` is passed, the function evaluates either kernel: ``end`` updates x at the end of a stage.
     """
     program, layout = loops.program, loops.layout
     adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
