@@ -127,8 +127,8 @@ LIE_ALGEBRA = Record(
             default="plus",
         ),
     ),
-    one=("name", "matrices", "structure_constants"),
-    exactly=True,
+    alternatives=("name", "matrices", "structure_constants"),
+    one_required=True,
     example="{name: so(3)}",
 )
 _FORMS: dict[str, tuple[Kind, str]] = {
@@ -195,18 +195,18 @@ def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
             )
         )
     keys = tuple(f.key for f in forms)
-    instead: tuple[str, ...] = ()
+    substitutes: tuple[str, ...] = ()
     if subject == "poisson":
-        instead = ("bonds",)
+        substitutes = ("bonds",)
         bond_help = "for graphs: {x[a]: {y[b]: f}} is the bracket f of x and y at the ends a and b of a bond"
         forms.append(RecordKey("bonds", MapOf(NEIGHBOUR, MapOf(NEIGHBOUR, FORMULA)), bond_help))
     example = "{lie_algebra: {name: so(3)}}"
     return Record(
         subject,
         (*further_keys, *forms),
-        one=keys,
-        exactly=True,
-        instead=instead,
+        alternatives=keys,
+        one_required=True,
+        substitutes=substitutes,
         example="" if further_keys else example,
     )
 
@@ -318,8 +318,8 @@ LATTICE = Record(
         ),
         RecordKey("pairs", OneOf(("all",)), "all means that every site interacts with every other site"),
     ),
-    one=("axes", "graph", "pairs"),
-    exactly=True,
+    alternatives=("axes", "graph", "pairs"),
+    one_required=True,
 )
 DENSITIES = Record(
     "hamiltonian",
@@ -328,7 +328,7 @@ DENSITIES = Record(
         RecordKey("bonds", FORMULA, "the terms of H for one bond of a graph, from the site a to the site b"),
         RecordKey("pairs", FORMULA, "the terms of H for one pair of sites, a and b"),
     ),
-    some=True,
+    nonempty=True,
 )
 CASIMIR = Record(
     "a Casimir",
@@ -355,8 +355,8 @@ OBSERVABLE = Record(
             default="sites",
         ),
     ),
-    one=REDUCTIONS,
-    exactly=True,
+    alternatives=REDUCTIONS,
+    one_required=True,
     example="{mean: x}",
 )
 FORCES = Record(
@@ -527,9 +527,9 @@ RUN = Record(
         ),
         RecordKey("description", PROSE, "what the run shows"),
     ),
-    one=("steps", "duration", "until"),
-    exactly=True,
-    elsewhere=_BESIDE_RUNS,
+    alternatives=("steps", "duration", "until"),
+    one_required=True,
+    hints=_BESIDE_RUNS,
 )
 
 #: A word under ``keep`` of a sweep, such as final or mean(M). Whether the observable M exists is checked later.
@@ -751,6 +751,6 @@ SPEC = Record(
             "named sweeps: each repeats a run for many parameters or initial values, by phigen sweep",
         ),
     ),
-    one=("order", "terms"),
-    elsewhere=_IN_RUNS,
+    alternatives=("order", "terms"),
+    hints=_IN_RUNS,
 )

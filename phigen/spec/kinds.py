@@ -330,20 +330,20 @@ class RecordKey:
 class Record(Kind):
     """A mapping with fixed keys. It is read as a dictionary, from which keys with errors are left out.
 
-    At most one of the keys in ``one`` may be present. If ``exactly``, one of these keys is required, unless a key in
-    ``instead`` is present. Keys in ``instead`` may be combined with those in ``one``. If ``some``, the mapping must not
-    be empty. If the value is no mapping, the error shows ``example``. ``elsewhere`` has hints for keys that belong to
-    another part of the spec.
+    At most one of the keys in ``alternatives`` may be present. If ``one_required`` is true, at least one key in
+    ``alternatives`` or ``substitutes`` must be present. A key in ``substitutes`` may be combined with a key in
+    ``alternatives``. If ``nonempty`` is true, the mapping must not be empty. If the value is no mapping, the error
+    shows ``example``. ``hints`` has hints for keys that belong to another part of the spec.
     """
 
     what: str
     fields: tuple[RecordKey, ...]
-    one: tuple[str, ...] = ()
-    exactly: bool = False
-    some: bool = False
-    instead: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
+    one_required: bool = False
+    nonempty: bool = False
+    substitutes: tuple[str, ...] = ()
     example: str = ""
-    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    hints: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def expected(self) -> str:  # type: ignore[override]
@@ -416,7 +416,7 @@ class Record(Kind):
     def _hint(self, name: str, node: MappingNode) -> str:
         """Return the hint for an unknown key: where it belongs, else the key that was probably meant, else all keys."""
         meant, keys = MEANT.get(name, name), [f.key for f in self.fields]
-        misplaced = self.elsewhere.get(name) or ("" if meant in keys else self.elsewhere.get(meant, ""))
+        misplaced = self.hints.get(name) or ("" if meant in keys else self.hints.get(meant, ""))
         key = self._resembled_key(name, node)
         return misplaced or (f"did you mean {key!r}?" if key else "") or self.instructions()
 
@@ -443,13 +443,18 @@ class Record(Kind):
                     f"{self.what}: the key {key_field.key!r} is missing",
                     f"{key_field.key}: {key_field.description}",
                 )
-        forms = [name for name in node.entries if name in self.one]
+        forms = [name for name in node.entries if name in self.alternatives]
         for name in forms[1:]:
             message = f"{self.what}: {forms[0]} and {name} exclude each other"
             reader.error(node.entries[name][0], message, "give only one of them")
-        if self.exactly and not forms and not strange and not any(name in node.entries for name in self.instead):
-            reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
-        if self.some and not node.entries:
+        if (
+            self.one_required
+            and not forms
+            and not strange
+            and not any(name in node.entries for name in self.substitutes)
+        ):
+            reader.error(node, f"{self.what}: one of {', '.join(self.alternatives)} is needed")
+        if self.nonempty and not node.entries:
             reader.error(node, f"{self.what}: one of {', '.join(keys)} is needed")
 
     def schema(self) -> Schema:
@@ -461,14 +466,14 @@ class Record(Kind):
         schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
         if required := [f.key for f in self.fields if f.required]:
             schema["required"] = required
-        if self.some:
+        if self.nonempty:
             schema["minProperties"] = 1
-        if self.exactly:
-            exclusive: Schema = {"oneOf": [{"required": [key]} for key in self.one]}
-            alternatives = [{"required": [key]} for key in self.instead]
-            schema |= {"anyOf": [exclusive, *alternatives]} if alternatives else exclusive
-        elif self.one:
-            schema["not"] = {"required": list(self.one)}
+        if self.one_required:
+            exclusive: Schema = {"oneOf": [{"required": [key]} for key in self.alternatives]}
+            substitutes = [{"required": [key]} for key in self.substitutes]
+            schema |= {"anyOf": [exclusive, *substitutes]} if substitutes else exclusive
+        elif self.alternatives:
+            schema["not"] = {"required": list(self.alternatives)}
         return schema
 
 

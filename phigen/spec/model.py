@@ -48,11 +48,11 @@ class Values:
 class Parameter:
     """A parameter of the spec, which is a run-time argument of the generated code.
 
-    ``value`` is the default. If ``small``, the parameter is a factor of those terms of H that are a small
-    perturbation. If ``nonnegative``, the parameter is 0 or positive. ``at`` is ``all`` for one number. In lattices,
-    ``sites`` or ``bonds`` stands for an array with a value at each site or bond. If the defaults of an array are not
-    all equal, ``values`` describes them, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is
-    converted.
+    ``value`` is the default. If ``small`` is true, the terms of H with this factor are a small perturbation. If
+    ``nonnegative`` is true, the parameter is 0 or positive. The field ``at`` is "all" if the parameter is one number.
+    In lattices the field may also be "sites" or "bonds": the parameter is then an array with a value at each site or
+    bond. If the defaults of an array are not all equal, ``values`` describes them, and ``value`` is 1 and unused.
+    ``unit`` is shown to users: nothing is converted.
     """
 
     name: str
@@ -268,7 +268,7 @@ class Run:
     at: tuple[Fraction, ...] = ()  # times of stored rows, instead of the stride
     stop: Expression | None = None  # the run ends where this expression passes through 0
     record: tuple[str, ...] = ()  # columns of the output (state, energy, Casimirs, observables); all by default
-    # ranges of coordinates for which phigen certify bounds the errors of a step
+    # ranges of coordinates; for states in these ranges, ``phigen certify`` computes bounds for the errors of a step
     box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
     description: str = ""
     lattice: LatticeRunSettings | None = None
@@ -418,11 +418,11 @@ class Lattice:
 
     ``axes`` name the directions of a grid, with a ``boundary`` for each: ``periodic`` or ``open``. ``graph`` is the
     name of the list of bonds. ``pairs`` says that every two sites form a pair. ``poisson`` and ``hamiltonian`` of the
-    spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps pairs (f, g) of
-    symbols at two different sites to the bracket {f, g}; it contains (f, g) or (g, f), not both. ``kinds`` says for the
-    density of each Casimir what is constant: its value at every site (``sites``), or its ``sum`` or ``product`` over
-    the sites. ``reductions`` has the reductions of observables to one number; an observable without a reduction is a
-    field, with a value at each site.
+    spec are those of a site. ``bonds`` is the contribution of one bond or one pair to H. ``brackets`` maps pairs (f, g)
+    of symbols at two different sites to the bracket {f, g}; it contains (f, g) or (g, f), not both. ``kinds`` says for
+    the density of each Casimir what is constant: its value at every site (``sites``), or its ``sum`` or ``product``
+    over the sites. ``reductions`` has the reductions of observables to one number; an observable without a reduction is
+    a field, with a value at each site.
     """
 
     axes: tuple[str, ...] = ()

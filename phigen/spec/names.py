@@ -119,8 +119,8 @@ REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
 #: Elements of a lattice over which the density of an observable may be reduced.
 OVER = ("sites", "bonds", "pairs")
-#: Statistics of an observable M over a run that a sweep may store: mean(M), the standard deviation std(M), and the
-#: standard error error(M) of the mean.
+#: Statistics that a sweep may store for an observable M: the mean mean(M) over a run, the standard deviation std(M),
+#: and the standard error error(M) of the mean.
 STATISTICS = ("mean", "std", "error")
 
 #: Representations of an attitude (the rotation of a rigid body) that ``reconstruct:`` may name.

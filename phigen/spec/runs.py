@@ -170,7 +170,7 @@ def _recorded(
 def _average(
     name: str, raw: Mapping[str, Any] | None, declared: Declarations, averaged: Collection[str]
 ) -> AverageChoice:
-    """Return the setting ``average`` of the run ``name``; ``averaged`` are the observables that are one number."""
+    """Return the setting ``average`` of the run ``name``. Only the observables in ``averaged`` may be averaged."""
     if raw is None:
         return AverageChoice()
     selected = without_repetition(

@@ -56,7 +56,7 @@ def correlation_of(
 
 
 def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations) -> bool:
-    """Return whether a run may have ``key``: it needs a grid and stored states. If not, the error is reported."""
+    """Return whether a run may have ``key``, which requires a grid and stored states. If not, an error is reported."""
     place, add = declared.reader.locations["runs", name, key], declared.reader.problems.add
     if declared.relation != "grid":
         add(

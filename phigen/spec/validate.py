@@ -419,7 +419,9 @@ def _on_covectors(
 
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
-    """Return the names ``p_NAME`` of momenta with their symbols; report names that the spec declares itself."""
+    """Return the names ``p_NAME`` of momenta with their symbols. If the spec already uses one of these names, an error
+    is reported.
+    """
     momenta = {f"p_{c}": symbol(momentum(c)) for c in declared.coordinates}
     for name in [c for c in momenta if c in declared.nodes]:
         message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"

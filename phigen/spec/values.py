@@ -78,7 +78,9 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
 
 
 def _option(entries: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
-    """Return the value under a key of random values; None if the key is absent, or after a reported error."""
+    """Return the value of ``key`` in a mapping {random: …, seed: …}; None if the key is absent, or after a reported
+    error.
+    """
     node, value = entries.get(key, (None, None))
     if node is None or value is None:
         return None

@@ -41,7 +41,9 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """Return the place of the character ``index`` of the text in the file; if unknown, the place of the scalar."""
+        """Return the place in the file of character number ``index`` of the text. If this place is unknown, return the
+        place of the scalar.
+        """
         here = self.location
         if self.offset is not None:
             return Location(here.line, here.column + self.offset + index, here.file)
