@@ -275,10 +275,10 @@ class _Recursion:
 
 
 def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:
-    """Return the coefficient of t^i in τ − t/2, as {symbol of τ: coefficient}.
+    """Return the coefficient of t^i in τ − t/2, as a dictionary with the symbol τ as key.
 
-    τ − t/2 is the time at the beginning of a step of size t. If ``times`` is empty, H does not depend on the time, and
-    the dictionary is empty.
+    A step of size t has its middle at the time τ, and begins at τ − t/2. If ``times`` is empty, H does not depend on
+    the time, and the dictionary is empty.
     """
     values = {0: ring.variable, 1: lambda _: ring.constant(Fraction(-1, 2))}
     return {t: values.get(i, lambda _: ring.constant(0))(t) for t in times}

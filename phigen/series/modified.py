@@ -70,7 +70,8 @@ def modified_series(
 class _ModifiedRecursion:
     """The recursion for H_0, H_1, …, with its results so far: ``terms`` are H_0 … H_{r−1}.
 
-    ``slopes`` are the derivatives of s_0 = 0, s_1, …, s_r with respect to the coordinates.
+    ``slopes`` are the derivatives of s_0 = 0, s_1, …, s_r with respect to the coordinates. The docstring of the module
+    defines the s_r.
     """
 
     def __init__(
@@ -119,7 +120,7 @@ class _ModifiedRecursion:
         self.composed.append((target, Taylor([target], self.tower, [*self.momenta, *self.times])))
 
     def _level(self, j: int, level: int) -> Poly:
-        """Return the coefficient of h^level in H_j(α(x, ∇S(σ))), with the σ and S(σ) of the text of this module."""
+        """Return the coefficient of h^level in H_j(α(x, ∇S(σ))). The docstring of the module defines σ and S(σ)."""
         pair = self.composed[j]
         if pair is None:
             return self.tower.zero
@@ -130,10 +131,10 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """Return the coefficient of h^k in τ − σh/2, as {symbol of τ: coefficient}.
+        """Return the coefficient of h^k in τ − σh/2, as a dictionary with the symbol τ as key.
 
-        τ − σh/2 is the time at the beginning of a step of size σh. If H does not depend on the time, the dictionary is
-        empty.
+        A step of size σh has its middle at the time τ, and begins at τ − σh/2. If H does not depend on the time, the
+        dictionary is empty.
         """
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}

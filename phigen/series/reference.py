@@ -123,9 +123,9 @@ def _coefficient(
 
 
 class Series:
-    """Power series u_1(t), …, u_n(t) without constant term, with coefficients in the ring ``functions``.
+    """Power series u_0(t), …, u_{n−1}(t) without constant term, with coefficients in the ring ``functions``.
 
-    ``coefficient(k, j)`` returns the coefficient of t^j in series number k; numbers count from 0.
+    ``coefficient(k, j)`` returns the coefficient of t^j in u_k(t).
     """
 
     def __init__(self, functions: Functions, coefficient: Callable[[int, int], Any]) -> None:

@@ -27,9 +27,10 @@ def defects(
     p: Sequence[Any],
     d: int,
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the parts of the axioms that do not reduce to 0, as pairs of a name and an expression.
+    """Yield the nonzero residuals of the axioms, as pairs of a name and an expression.
 
-    ``poisson`` is the matrix π(x). ``alpha`` and ``beta`` have for each component the a_μ and b_μ with 0 < |μ| ≤ d.
+    ``poisson`` is the matrix π(x). ``alpha`` has the Taylor coefficients a_μ with 0 < |μ| ≤ d for each component of α.
+    ``beta`` has the coefficients b_μ for each component of β.
     """
     n = len(x)
     tensor = {(i, j): taylor(poisson[i, j], x, d - 1) for i in range(n) for j in range(i)}
@@ -68,7 +69,11 @@ class _Parts:
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
     def bracket(self, f: int, g: int, degree: int) -> Any:
-        """Return the part of degree ``degree`` in p of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c."""
+        """Return those terms of {f, g} that have the degree ``degree`` in p.
+
+        The bracket is {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c. The arguments ``f`` and ``g`` are numbers of
+        components. The components of α come first, then those of β.
+        """
         splits = [(k, degree + 1 - k) for k in range(degree + 2)]
         terms = (
             self._part(f, k, c) * self._covector_slope(g, m, c) - self._covector_slope(f, k, c) * self._part(g, m, c)

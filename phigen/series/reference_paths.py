@@ -21,7 +21,7 @@ from phigen.series.reference_functions import Functions
 
 
 def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[list[Any]]:
-    """Yield the terms m_1(s), m_2(s), … of the path without end, each as n expressions in x, p and s.
+    """Yield, without end, the terms m_1(s), m_2(s), … of the path, each as n expressions in x, p and s.
 
     ``poisson`` is the matrix π(x).
     """
