@@ -12,8 +12,8 @@ FILES = {"cmake": ("CMakeLists.txt", ".c"), "meson": ("meson.build", ".c"), "pyt
 def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> dict[str, str]:
     """Return the files for build systems (name → text).
 
-    ``solvers`` maps the name of each solver in the folder to its files. The file for a build system lists those files
-    of the solvers that have the suffix in `FILES`.
+    ``solvers`` maps the name of each solver in the folder to its files. Each build system has a suffix in `FILES`: its
+    file lists all files of the solvers with this suffix.
     """
     return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
 

@@ -96,7 +96,9 @@ class Options:
         return self.targets or compilation.spec.targets
 
     def command(self, spec_files: Sequence[str]) -> str:
-        """Return the command line of ``phigen build`` for spec files, with these options and this output folder."""
+        """Return the command line of ``phigen build`` for spec files, with the options and the output folder of this
+        object.
+        """
         arguments = ["phigen", "build", *spec_files]
         if str(self.directory) != DIRECTORY:
             arguments += ["-o", str(self.directory)]

@@ -25,7 +25,7 @@ _PROCESSOR = Path("/proc/cpuinfo")
 def studied(
     compilation: Compilation, experiment: Experiment, quick: bool, console: Console
 ) -> tuple[Study | None, str]:
-    """Return a pair: the study of precision and time, and "". Without a study the pair is None and the reason."""
+    """Return two values: the study of precision and time, or None; and the reason why there is no study, or ""."""
     import numpy as np
 
     from phigen.api import solver_of

@@ -22,10 +22,11 @@ sizes_option = click.option(
 
 
 def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
-    """Return the spec with the sizes ``text`` in the run called ``name``, by default the first run.
+    """Return the spec with other sizes of the lattice in the run called ``name``, by default in the first run.
 
-    Without ``text`` the spec is unchanged. Raises `click.BadParameter` for texts that are no sizes, for systems without
-    sizes, and for sizes that are too small for the stencil.
+    ``text`` states the sizes, such as 64x64. If ``text`` is None, the spec is returned unchanged. Raises
+    `click.BadParameter` if ``text`` does not state sizes, if sizes cannot be chosen for this system, or if a size is
+    too small for the stencil.
     """
     if text is None:
         return spec
@@ -49,7 +50,7 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
     if complaint := too_small(cell_from_spec(spec), sizes, text):
         raise click.BadParameter(complaint, param_hint=OPTION)
     resized_run = replace(run, lattice=replace(run.lattice, sizes=sizes))
-    # Errors about these sizes have no location in the spec, whose lines contain other sizes.
+    # An error about the new sizes must not point to a line of the spec, because this line contains the old sizes.
     elsewhere = {("runs",), ("runs", run.name), ("runs", run.name, "sizes")}
     locations = {path: location for path, location in spec.locations.items() if path not in elsewhere}
     return replace(spec, runs={**spec.runs, run.name: resized_run}, locations=locations)

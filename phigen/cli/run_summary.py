@@ -97,7 +97,11 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
 
 
 def print_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> None:
-    """Print the time averages of observables over the rows of a run; ``observables`` selects some, by default all."""
+    """Print the time averages of observables over the rows of a run.
+
+    ``names`` lists the observables in ``averages``. ``observables`` lists those to print; if the list is empty, all are
+    printed.
+    """
     if not averages.count:
         out("\n  observables have no means: no row is stored within the times of average:")
         return

@@ -1,4 +1,6 @@
-"""``phigen verify``: measure whether the solvers of specs keep the promised properties, and compare with bounds."""
+"""``phigen verify``: measure how well solvers keep the properties that phigen promises, and compare the results with
+bounds.
+"""
 
 from __future__ import annotations
 
