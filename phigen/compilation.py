@@ -176,7 +176,7 @@ class _Compiled(ABC):
         return None
 
     def named(self, method: str) -> str:
-        """Return the line ``method``, which names the method. Subclasses may add the reason for the method."""
+        """Return ``method``, a line of text that names the method. Subclasses may add the reason for the method."""
         return method
 
     def by_series(self) -> CompiledSeries:
@@ -546,8 +546,8 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return the line ``method``, which names the method. The line goes on with the reason if the sizes of the runs
-        decided the colours, the seam or the scheme.
+        """Return ``method``, a line of text that names the method. If the sizes in runs are the reason for the colours,
+        for a seam or for the series, the line also states this reason.
         """
         if not self.sweeps.since:
             return method
@@ -556,7 +556,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation. Compilations of other systems raise `ValueError`."""
+        """Return this compilation, which is the compilation of a lattice of any size."""
         return self
 
     def by_kind(

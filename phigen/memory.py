@@ -38,14 +38,13 @@ def expect_room(what: str, byte_count: int, place: Location | None = None, hint:
     raise LimitError([Diagnostic(message, place, hint)])
 
 
-def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
-    """Return a new array, filled with NaN. Raises `LimitError` if it does not fit into memory; ``what`` is its
-    name.
+def filled(name: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
+    """Return a new array, filled with NaN. Raises `LimitError` if the array does not fit into memory.
 
-    Writing NaN takes the memory at once. The memory of an array from ``np.empty`` would still count as available when
-    the next array is allocated.
+    ``name`` is the subject of the error message, such as "12 frames". Writing NaN takes the memory at once. The memory
+    of an array from ``np.empty`` would still count as available when the next array is allocated.
     """
-    expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
+    expect_room(name, np.dtype(dtype).itemsize * math.prod(shape))
     return np.full(shape, np.nan, dtype)
 
 
