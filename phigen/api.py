@@ -144,8 +144,8 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
     """Return the compilation of a source. The statements about the system and the method are proved.
 
-    The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is that of the options, else
-    that of a source that is a compilation, else ``fast``. Raises the errors of `compile`.
+    The options override the spec, see `phigen.spec.model.Spec.overridden`. If the options state no profile, a source
+    that is a compilation keeps its profile; all other sources get the profile ``fast``. Raises the errors of `compile`.
     """
     _expect_valid(**options)
     if isinstance(source, Compilation):
@@ -276,10 +276,10 @@ def interface_of(program: Program) -> Interface:
         observed_fields=program.observables.fields,
         casimir_kinds=step.casimir_kinds,
         periods=sites.periods,
-        least=sites.least,
+        least=sites.min_sizes,
         required=frozenset(p.name for p in program.parameters if p.values is not None),
-        first_open=sites.open[0],
-        open_axes=sites.open,
+        first_open=sites.open_axes[0],
+        open_axes=sites.open_axes,
         colour_period=sites.colours // math.gcd(sites.colours, sites.weights[0]),
         graph=bool(step.partners and step.partners.graph),
         pairs=every_other,

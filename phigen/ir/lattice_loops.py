@@ -48,7 +48,9 @@ class LatticeLoops:
         coloured = self.step.sites.colours > 1
         if sweep is None:
             return ir.ALL_SITES
-        return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
+        return ir.Selection(
+            sweep.colour if coloured else None, sweep.omits_seams and coloured, sweep.window, sweep.first
+        )
 
     def stage(self, kernel: Kernel) -> ir.Function:
         """Return the function of a kernel of a stage. The function reads the fields of y, the unknown of the stage."""

@@ -178,7 +178,7 @@ class _Driver:
         copies = [[*self._copied_ends(case)] for case in segments]
         if len(segments) > 1 and drivers.one_loop:
             last: ir.Block = ()
-            if drivers.layout.lattice.step.sites.open == (True,) and any(copies):
+            if drivers.layout.lattice.step.sites.open_axes == (True,) and any(copies):
                 first, k = segments[0], ir.fixed("k")
                 copy = drivers.copied_ends(first.arrays, k, near_ends=first.near_ends)
                 last, copies = (ir.Loop("line", (copy,), "k", ir.Constant(0), ir.fixed("DIM")),), [[] for _ in copies]

@@ -300,7 +300,7 @@ def _seamed(
     """
     seamed = colouring.with_seams(cell)
     small = any(
-        size < seam.least
+        size < seam.min_size
         for run in spec.runs.values()
         for size, seam in zip(run.lattice.sizes if run.lattice else (), seamed.seams, strict=False)
     )
@@ -456,9 +456,9 @@ def _sweep(
     purpose = f"for each site a, the sum of the forces of H_{k} by {_others(cell)} b"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients, late=late) if tangent else None
-    inside, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
-    tangent_sweep = replace(tangent_sweep, inside=inside, window=window) if tangent_sweep else None
-    return Sweep(kernel, updated, motion.colour, gather, tangent_sweep, inside, window)
+    omits_seams, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
+    tangent_sweep = replace(tangent_sweep, omits_seams=omits_seams, window=window) if tangent_sweep else None
+    return Sweep(kernel, updated, motion.colour, gather, tangent_sweep, omits_seams, window)
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients, *, late: bool) -> Sweep:
@@ -538,7 +538,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
     axes, boundary = cell.axes or ("i",), cell.boundary or (PERIODIC,)
     reach = [max((abs(o[a]) for _, o in places.values()), default=0) for a in range(len(axes))]
     least = [max(a, b) for a, b in zip(reach, least_sizes(cell) or (1,), strict=True)]
-    least = [max(a, seam.least) for a, seam in zip(least, colouring.seams or [Seam()] * len(axes), strict=True)]
+    least = [max(a, seam.min_size) for a, seam in zip(least, colouring.seams or [Seam()] * len(axes), strict=True)]
     return Sites(
         axes,
         tuple(b != PERIODIC for b in boundary),

@@ -213,7 +213,7 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"this H has {count} part{'s' * (count > 1)}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
-    hint = "small: true of a parameter declares that the terms with this factor are small"
+    hint = "add small: true to a parameter, to declare that the terms of H with this factor are small"
     return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
 
 

@@ -21,8 +21,9 @@ Terms = Mapping[Monomial, Expression]
 
 @dataclass(frozen=True)
 class Collected:
-    """A ring of collected polynomials: its variables, and the derivatives of the variables with respect to the
-    coordinates.
+    """A ring of collected polynomials. The ``variables`` depend on the state; the coefficients do not.
+
+    ``slopes`` has the derivatives of the variables with respect to the coordinates.
     """
 
     variables: tuple[Expression, ...]
@@ -63,9 +64,10 @@ def collect(
 ) -> tuple[Collected, list[Terms]]:
     """Return a ring of collected polynomials, and the ``elements`` of a tower as polynomials of this ring.
 
-    A tower is a polynomial ring over the rationals with function values as variables. ``times`` are symbols of the
-    time, if H depends on it. Then the coefficients may depend on the time; each is written as a polynomial in values
-    such as sin(t), whose own coefficients depend only on parameters.
+    A tower is a polynomial ring over the rationals with function values as variables. In the returned ring, the
+    variables depend on the state, and the coefficients do not. If H depends on the time, ``times`` has the symbols of
+    the time. Each coefficient is then a polynomial in values such as sin(t). The coefficients of this polynomial depend
+    only on parameters and the step size.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
     static = [i for i in range(len(tower.names)) if i not in state and i not in dated]

@@ -75,7 +75,7 @@ class Factors:
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:
-        """Return the factors with each of the `values` replaced by a symbol of the kind ``kind``, numbered from 0."""
+        """Return a copy of the factors with numbered symbols of the kind ``kind`` in place of the `values`."""
         names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}
@@ -148,7 +148,7 @@ def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Ex
 def inversion(pattern: Pattern) -> tuple[list[Expression], list[Expression]]:
     """Return J⁻¹, row by row, by Gauss–Jordan elimination, and the reciprocal pivots.
 
-    J has the symbol ``J:i:j`` where the pattern is true and on the diagonal, 0 elsewhere.
+    The entry (i, j) of J is the symbol ``J:i:j`` if i = j, or if ``pattern[i][j]`` is true. All other entries are 0.
     """
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]

@@ -16,8 +16,8 @@ from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
 
-#: Number of rows of a matrix in the first batch of a count. A few rows are enough to recognise a matrix with far more
-#: operations than the limit.
+#: The operations of a matrix are counted in batches of rows. This is the number of rows in the first batch. A few rows
+#: are enough to recognise a matrix with far more operations than the limit.
 FIRST_ROWS = 8
 
 #: The nonzero entries of a matrix row, by the index of the column.
@@ -99,7 +99,7 @@ class OperationCount:
         contain."""
         operations_before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
-        columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
+        columns = self._distinct_columns([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
         with progress.stage("operations of the Newton matrix", len(left)) as running:
             for row in left:
                 self._row(row, columns)
@@ -116,8 +116,10 @@ class OperationCount:
             self._total(terms)
 
     @staticmethod
-    def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
-        """Return the rows of a matrix without repeated columns, since equal columns lead to the same operations."""
+    def _distinct_columns(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
+        """Return the rows of a matrix after columns that repeat another column are removed. A repeated column adds no
+        operations.
+        """
         columns: dict[int, list[tuple[int, int]]] = {}
         for k, row in enumerate(rows):
             for j, leaf in row.items():

@@ -1,10 +1,9 @@
 """Collection of constant factors, whose products are computed once, before the steps.
 
-Every value is written as q·s·c with a number q, a static factor s, which depends on parameters and the step size, and a
-factor c that depends on the state. For a product, the three factors are multiplied separately. In a sum, a static
-factor that all terms share is factored out: (h²x²)/4 + (h²y²)/4 becomes (h²/4)(x² + y²), with one coefficient and four
-operations. A number that is factored out of a sum is multiplied into the coefficient of the product that contains the
-sum.
+Every value is written as q·s·c with a number q, a factor s that does not depend on the state, and a factor c that does.
+For a product, the three factors are multiplied separately. In a sum, a factor s that all terms share is factored out:
+(h²x²)/4 + (h²y²)/4 becomes (h²/4)(x² + y²), with one coefficient and four operations. A number that is factored out of
+a sum is multiplied into the coefficient of the product that contains the sum.
 """
 
 from __future__ import annotations
@@ -20,8 +19,10 @@ from phigen.symbolic.expression import ONE, Expression, add, fold, neg, number, 
 
 @dataclass(frozen=True)
 class _Value:
-    """A value q·s·c: a ``number`` q, a ``static`` factor s, and a ``core`` c, which is 1 if the value is independent of
-    the state."""
+    """A value as a product q·s·c of three factors: the fields ``number``, ``static`` and ``core``.
+
+    The factor s does not depend on the state. The factor c depends on the state, or is 1.
+    """
 
     number: Fraction
     static: Expression
@@ -33,9 +34,10 @@ def _sum(a: Expression, ratio: Fraction, b: Expression) -> Expression:
 
 
 def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expression]:
-    """Return the expressions ``roots`` with the static factors of each product collected into one factor.
+    """Return the expressions ``roots``. In each product, one coefficient replaces all factors that do not depend on the
+    state.
 
-    Each collected factor is replaced by a coefficient of the table ``coefficients``.
+    The coefficients are added to the table ``coefficients``.
     """
 
     def product(v: _Value) -> Expression:
@@ -45,7 +47,7 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
         return factor if v.core is ONE else factor * v.core
 
     def visit(e: Expression, args: list[_Value]) -> _Value:
-        if coefficients.is_static(e):
+        if coefficients.is_state_independent(e):
             return _Value(Fraction(e.value), ONE, ONE) if e.is_number else _Value(Fraction(1), e, ONE)
         if e.op == "mul":
             a, b = args
@@ -70,7 +72,8 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
 def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
     """Return the increments with coefficients in place of state-independent values.
 
-    Two forms are compared: with static factors collected by `gather`, and without. The cheaper form is returned.
+    Two forms are compared: the result of `gather`, and the result of `Coefficients.hoist`. The cheaper form is
+    returned.
     """
     hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
     return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)

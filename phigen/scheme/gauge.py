@@ -64,7 +64,7 @@ class Gauge:
 
     @property
     def multiples(self) -> tuple[str, ...]:
-        """The symbols of the multiples λ of those Casimirs for which the solver chooses λ."""
+        """The symbols λ, one for each Casimir whose multiple the solver chooses."""
         return tuple(Symbol(GAUGE, name) for name in self.free)
 
     @property
@@ -139,10 +139,11 @@ def choose(
     """Return the system in the gauge that the spec asks for: ``none``, ``auto``, or expressions for the multiples of
     some Casimirs.
 
-    With ``auto`` the multiple λ of a Casimir is free if three conditions hold. S_3 depends on λ; for log-canonical π it
-    never does. S_3 has hardly more terms with λ than without; for tops it has many more. π∇S_3 is cheap enough for a
-    search. No λ is free if H depends on the time, or if there are forces, noise or a monitor. The bi-realisation must
-    be exact and symmetric.
+    With ``auto``, the solver chooses the multiple λ of a Casimir C if three conditions hold. First, S_3 depends on λ,
+    where S_3 is the third term of the series of H − λC. Second, S_3 has hardly more terms with λ than without. Third,
+    π∇S_3 is cheap enough for a search. The first condition never holds for log-canonical π, and the second does not
+    hold for tops. The solver chooses no λ if H depends on the time, or if there are forces, noise or a monitor. The
+    bi-realisation must be exact and symmetric.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))

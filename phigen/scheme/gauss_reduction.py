@@ -26,9 +26,10 @@ from phigen.scheme.steps import ReducedSweeps
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kind of the symbols for the sums Σ_j ν_ij L_k,j at stage i, which the kernels of reduced sweeps read. Such a sum is
-#: the integral of the unknown z_k up to the stage.
-READ = "u"
+#: Kind of the symbols for integrals that the kernels of reduced sweeps read. The symbol for an unknown z_k stands for
+#: its integral from the start of the step to a stage, divided by the step size. At stage i this is Σ_j ν_ij L_k,j; the
+#: docstring of the module defines ν_ij and L_k,j.
+INTEGRAL = "u"
 
 #: Two symbols. The first is the time of a stage since the start of the step, as a fraction of the step. The second is
 #: the step size.
@@ -46,7 +47,9 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     rates = vector_field(points, at_unknowns(points))
     reads = [{k for k, z in enumerate(points.unknowns) if z in names} for names in map(symbols_of, rates)]
     rows = sparse_derivatives(rates, points.unknowns)
-    linear = [k for k, row in enumerate(rows) if all(coefficients.is_static(slope) for slope in row.values())]
+    linear = [
+        k for k, row in enumerate(rows) if all(coefficients.is_state_independent(slope) for slope in row.values())
+    ]
     required = _required_unknowns(reads)
     followers = [k for k in _followers(linear, reads) if k in required]
     iterated = [k for k in required if k not in followers]
@@ -55,9 +58,9 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
         return None
     if points.realisation.exact and not _are_conjugate(points, iterated, followers):
         return None
-    symbols = [Symbol(READ, k) for k in range(len(integrated))]
+    symbols = [Symbol(INTEGRAL, k) for k in range(len(integrated))]
     integrals = {points.unknowns[k]: symbol(s) for k, s in zip(integrated, symbols, strict=True)}
-    offsets = [_followed(rates[f], rows[f], integrals) for f in followers]
+    offsets = [_follower_at_stage(rates[f], rows[f], integrals) for f in followers]
     follower_offsets = dict(zip((points.unknowns[f] for f in followers), offsets, strict=True))
     values = [symbol(WEIGHT) * value for value in substitute([rates[i] for i in iterated], follower_offsets)]
     inputs = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
@@ -77,10 +80,11 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 
 
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
-    """Whether the bracket of any two iterated unknowns, and of any two followers, is 0.
+    """Whether two brackets are 0: that of any two unknowns in ``iterated``, and that of any two unknowns in
+    ``followers``.
 
-    This holds for momenta and positions. The result is False if some unknown other than the time is in neither of the
-    two sets.
+    This is so if momenta are iterated and positions are followers. The result is False if some unknown other than the
+    time is in neither of the two lists.
     """
     places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
     index_pairs = ((i, j) for group in places for i in group for j in group)
@@ -116,11 +120,14 @@ def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
     return followers
 
 
-def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
-    """Return the offset of a follower at a stage: its linear equation, integrated from the start of the step.
+def _follower_at_stage(
+    rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]
+) -> Expression:
+    """Return the change of a follower from the start of the step to a stage.
 
-    ``rate`` is the right-hand side of the equation. ``row`` has its derivatives with respect to the other unknowns.
-    ``integrals`` has the integrals of these unknowns up to the stage.
+    A follower is an unknown whose derivative is a linear function of other unknowns. The expression ``rate`` is this
+    derivative, and ``row`` has the coefficients of the linear function. ``integrals`` has the integrals of the other
+    unknowns up to the stage, divided by the step size.
     """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]

@@ -61,8 +61,9 @@ class GeneratingFunction:
         return replace(self, slope=slope, hessian=tuple(map(tuple, rows)))
 
     def cost(self) -> int:
-        """Return the cost of one evaluation of gradient and Hessian in units of an addition, without state-independent
-        values."""
+        """Return the cost of one evaluation of gradient and Hessian, in units of an addition. Values that do not depend
+        on the state are not counted.
+        """
         return self._cost
 
     @cached_property
@@ -75,26 +76,26 @@ def collected_form(
     series: PolynomialSeries,
     coordinates: Sequence[str],
     static: Sequence[str],
-    worth: int,
+    other_cost: int,
     times: Sequence[str] = (),
     increments: Sequence[str] = (),
 ) -> list[GeneratingFunction]:
-    """Return S_h as a collected polynomial, in up to two forms.
+    """Return S_h as a collected polynomial: a list of at most two forms.
 
     In the first form each entry of the Hessian is a polynomial. In the second form the Hessian is the derivative of the
-    Horner form of the gradient. ``worth`` is the cost of another form of S_h, in units of an addition. ``increments``
-    are the symbols of noise increments, on which coefficients may depend. The list is empty if the polynomial has far
-    more monomials than ``worth``, or more exponents than `limits.CELLS`. Raises `OverflowError` if the polynomial is
-    too large to be counted.
+    Horner form of the gradient. ``increments`` are the symbols of noise increments, on which coefficients may depend.
+    ``other_cost`` is the cost of another form of S_h, in units of an addition. The list is empty if the number of
+    monomials is much larger than ``other_cost``, or if the number of exponents exceeds `limits.CELLS`. Raises
+    `OverflowError` if the polynomial is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
-    worth = max(worth, 200)
-    if len(s) > 10 * worth:  # terms may share a monomial in the coordinates, but rarely ten of them
+    other_cost = max(other_cost, 200)
+    if len(s) > 10 * other_cost:  # terms may share a monomial in the coordinates, but rarely ten of them
         return []
     slopes = tower.gradient(s, coordinates)
-    if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
+    if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(other_cost, MOST_SLOPES)):
         return []
     monitored = [tower.partial(s, LEVEL)] if LEVEL in static else []
     ring, (terms, *elapsed) = collect(tower, [s, *monitored], coordinates, times)

@@ -68,10 +68,7 @@ class Role(Enum):
 
     @property
     def is_energy(self) -> bool:
-        """Whether the kernel computes the density of an energy, or the derivative of this density.
-
-        Bonds and pairs contribute to energies.
-        """
+        """Whether the kernel computes the density of an energy, or the derivative of this density."""
         return self in (Role.ENERGY, Role.ENERGY_SLOPE)
 
     @property

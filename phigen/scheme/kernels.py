@@ -238,9 +238,9 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 
 
 def path_elimination(n: int) -> Kernel | None:
-    """Return the kernel of elimination for the equation for p of a step along paths; None if a loop is faster.
+    """Return the kernel that solves linear equations with a full n×n matrix; None if a loop is faster.
 
-    The n×n matrix of this equation is treated as full.
+    In a step along a path, each iteration for p calls this kernel.
     """
     return _elimination_kernel(full(n)) if n <= UNROLLED_DIMENSION else None
 

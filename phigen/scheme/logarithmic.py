@@ -33,16 +33,19 @@ from phigen.symbolic.symbols import LEVEL
 
 @dataclass(frozen=True)
 class Logarithmic:
-    """The monitor ``log`` of a splitting H = A + B, with K = log(A + e) − log(−B); ``negative`` is the function B."""
+    """The monitor ``log`` of a splitting H = A + B.
+
+    Steps have the Hamiltonian K = log(A + e) − log(−B) in place of H, where e is the energy level. ``negative`` is B.
+    """
 
     negative: Expression
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
-        """Return the expressions that the kernel of a flow of K = log(A + e) − log(−B) computes, for the flow of A or
-        of B.
+        """Return the expressions that the kernel of ``flow`` computes. ``flow`` is the flow of A or of B.
 
-        These are the increments of the coordinates, the physical time of the flow, and the square root of A + e or of
-        −B. The square root is NaN where the step is not defined, so that the step fails.
+        The expressions are the increments of the coordinates, the physical time of the flow, and a square root. For A
+        this is the square root of A + e, for B that of −B. The square root is NaN where the step is not defined, so
+        that the step fails.
         """
         argument, time = self._argument(flow), self.time(flow)
         increments = substitute(flow.increment, {TIME: time})
@@ -113,8 +116,9 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
 def composition_of(requested: str, order: int) -> str:
     """Return the name of the composition of a splitting with the monitor ``log``.
 
-    If the spec asks for ``auto``, this is a composition of Strang's splitting, else the ``requested`` one. Steps of
-    Strang's splitting of K stay on the orbit of a Kepler motion for every step size; steps of other methods need not.
+    If the spec asks for ``auto``, the result is a composition of Strang's splitting, else the ``requested`` one. For a
+    Kepler motion, Strang's splitting with this monitor stays on the exact orbit for every step size. Other methods need
+    not stay on this orbit.
     """
     composition = find("auto", order + order % 2)
     return composition.name if requested == "auto" and composition else requested

@@ -67,7 +67,7 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 def monitor_of(spec: Spec) -> Expression | None:
     """Return the monitor g of a spec whose steps have a generating function, or None.
 
-    Raises `SpecError` if the monitor is ``log``, for a lattice, and if H depends on the time. It also raises
+    Raises `SpecError` if the monitor is ``log``, if the system is a lattice, or if H depends on the time. Also raises
     `SpecError` if the system has forces and the spec states multiples of Casimirs as gauge.
     """
     if spec.monitor is None:

@@ -29,8 +29,9 @@ from phigen.gauss.tableau import gauss_nodes
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.corrector import corrector, schedule
 
-# The first halves of the fractions a and b of each method, up to the middle values. All digits are from Newton's method
-# on the order conditions.
+# Two strings for each method. The first string is the first half of the symmetric list a_1, a_2, …; the second string
+# is the first half of the list b_1, b_2, … If a list has a middle number, its half ends with this number. All digits
+# are from Newton's method on the order conditions.
 _8_4 = (
     "0.0753469602698928884165278036834744643726526645540790631409721 "
     "0.517916854688256782300773978496315644323847447821980915025719 "

@@ -53,17 +53,20 @@ class Nystrom:
         )
 
 
-def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Return a symmetric method for H = T + V. ``half`` has the first half of its times, and ``multiples`` the first
-    half of the multiples of its kicks.
+def _method(name: str, order: int, first: str, times: str, error: float, multiples: str = "") -> Nystrom:
+    """Return a symmetric method for H = T + V, described by the first half of its step.
 
-    The halves include the middle values. ``first`` is T or V, the part with which a step begins.
+    The half includes the middle flow. ``first`` is T or V, the part with which the step begins. ``times`` lists the
+    durations of the flows. If the method uses V + m h² {V, {V, T}} in place of V, then ``multiples`` lists the number m
+    for each flow of V. ``error`` is the norm of the leading error of the method.
     """
-    times = [Fraction(v) for v in half.split()]
+    first_times = [Fraction(v) for v in times.split()]
     kicks = [Fraction(v) for v in multiples.split()]
-    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # whether the middle flow, which is not repeated, is a kick
+    middle_kicks = (len(first_times) - 1) % 2 != (
+        first == "V"
+    )  # whether the middle flow, which is not repeated, is a kick
     mirrored = kicks[-2::-1] if middle_kicks else kicks[::-1]
-    return Nystrom(name, order, first == "V", (*times, *times[-2::-1]), (*kicks, *mirrored), error)
+    return Nystrom(name, order, first == "V", (*first_times, *first_times[-2::-1]), (*kicks, *mirrored), error)
 
 
 #: Times of the methods SRKN_6^b and SRKN_14^a, by S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta
@@ -154,8 +157,7 @@ _NYSTROM_18 = """
     -0.534650939236408517841131206699073656
 """
 
-#: All splitting methods of Nyström type: name, order, the part with which a step begins, times, norm of the leading
-#: error, multiples.
+#: All splitting methods of Nyström type; `_method` explains the arguments.
 METHODS = (
     _method("blanes-moan-rkn", 4, "V", _SRKN6B, 3.76e-5),
     _method("blanes-moan-rkn", 6, "T", _SRKN14A, 2.03e-7),

@@ -33,10 +33,10 @@ def transposed_at_ends(
     """Return the loops over bonds or pairs in which each site collects its own cotangents.
 
     No two sites write to the same place. A loop is given by the end at which the site lies, the bonds or pairs, and the
-    kernel. There is one loop if ``ends`` is for both sites of every bond or pair. With ``summed``, the kernel of this
-    loop also computes the sums that are transposed. There are two loops if ``ends`` selects an end or a colour. In the
-    first of the two the site is the end b of the bonds, and the cotangents of the sites at the ends a are read. In the
-    second the site is the end a.
+    kernel. If every bond or pair contributes to both of its sites, there is one loop. If also ``summed`` is true, the
+    kernel of this loop computes the sums of ``ends``, in addition to the cotangents. If ``ends`` selects an end or a
+    colour, there are two loops. In the first of the two the site is the end b of the bonds, and the cotangents of the
+    sites at the ends a are read. In the second the site is the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)
@@ -69,9 +69,9 @@ def paired(
 ) -> Kernel:
     """Return the transpose of a kernel of bonds or pairs, with all contributions of a bond added to its site a.
 
-    ``ends`` maps each symbol to a pair: a field or parameter, and an end. The parameters of bonds in ``opposite`` have
-    the opposite sign for the site at the end b. Some outputs contribute to sums over the whole lattice, or to
-    parameters of bonds. A loop over all sites and their bonds or pairs must add these outputs up.
+    ``ends`` maps each symbol to a pair: a field or parameter, and an end. ``opposite`` lists the parameters of bonds
+    that change their sign if the two ends of a bond are exchanged. Some outputs contribute to sums over the whole
+    lattice, or to parameters of bonds. A loop over all sites and their bonds or pairs must add these outputs up.
     """
     names = {place: s for s, place in ends.items()}
     exchanged = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}

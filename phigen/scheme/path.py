@@ -112,7 +112,7 @@ def build_slopes(system: System, coefficients: Coefficients, variables: Sequence
     tensor = coefficients.hoist([e for row in system.poisson for e in row])
     by_coefficient = [derivatives(flow, c) for c in variables]
     sources = [by_coefficient[u][i] for i in range(n) for u in range(len(variables))]
-    return _PathBuilder(system.coordinates).slopes(_chains([*flow, *jacobian, *tensor, *sources]))
+    return _PathBuilder(system.coordinates).slopes(_powers_as_products([*flow, *jacobian, *tensor, *sources]))
 
 
 def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
@@ -128,12 +128,13 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
     """Return the recurrences of the path ṁ = f. ``flow`` has the components of f, which contain m and constants."""
-    return _PathBuilder(coordinates).path(_chains(flow))
+    return _PathBuilder(coordinates).path(_powers_as_products(flow))
 
 
-def _chains(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the expressions with positive integer powers written as products, since all other powers need a
-    recurrence.
+def _powers_as_products(roots: Sequence[Expression]) -> list[Expression]:
+    """Return the expressions with products in place of powers whose exponent is a positive integer.
+
+    Other powers remain, and need a recurrence of their own.
     """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -198,8 +199,9 @@ class _PathBuilder:
         return moving
 
     def _as_series(self, e: Expression) -> int:
-        """Return the number of the series of a node; a value that is constant along the path becomes a series with the
-        single order 0.
+        """Return the index of the Taylor series of an expression, in the list ``series``.
+
+        If the expression is constant along the path, a series is added that has only the coefficient of order 0.
         """
         if id(e) not in self._series_of:
             value = self._value(e)

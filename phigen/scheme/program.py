@@ -28,8 +28,11 @@ OVERLOADED = "overloaded float"
 
 @dataclass(frozen=True)
 class About:
-    """Content of the header of generated files: ``facts`` are its lines; ``operations`` has the number of operations of
-    a step by kind."""
+    """Content of the header of generated files. ``facts`` are the lines of the header.
+
+    ``operations`` maps the name of an operation, such as ``divisions``, to the number of these operations.
+    `StepKind.unit` says to what the numbers refer: to a whole step, or for instance to one Newton iteration.
+    """
 
     title: str = ""
     license: str = "0BSD"

@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Name of an output of a transposed flow: the state before the flow. On lattices, an input has this name too. It has
-#: values after the flow: those of the updated fields that no other input has.
+#: Name of an output of a transposed flow: the state before the flow. On lattices, a transposed flow also has an input
+#: with this name. This input contains values after the flow: those of the updated fields that no other input contains.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
@@ -33,7 +33,9 @@ Form = Mapping[str, int]
 
 
 def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
-    """Return the parity of each coefficient, as a function of the duration of a flow: `ODD`, `EVEN` or `NEITHER`."""
+    """Return for each coefficient whether it is an odd or an even function of the duration of a flow: `ODD`, `EVEN` or
+    `NEITHER`.
+    """
     parities = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
     if step.refresh:
         slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(parities)}

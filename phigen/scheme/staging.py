@@ -23,8 +23,8 @@ T = TypeVar("T")
 #: The inputs of a step that change from step to step, with their description in generated code.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: TABLE is the name of the argument of kernels that holds all coefficients. NOW is the name of the output of
-#: ``refresh``, which is stored at the end of the table.
+#: TABLE names the argument of kernels that holds all coefficients. NOW names the output of the kernel ``refresh``. The
+#: values of this output stand at the end of the table.
 TABLE, NOW = "coef", "now"
 
 
@@ -51,8 +51,9 @@ class Coefficients:
 
     @property
     def table(self) -> tuple[str, ...]:
-        """The symbols of all coefficients that have been requested so far; those that are new in each step come
-        last."""
+        """The symbols of all coefficients that have been requested so far. The last symbols are those of coefficients
+        that change from step to step.
+        """
         entries = (name for e in self.exponentials for name in e.symbols)
         return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
 
@@ -67,7 +68,8 @@ class Coefficients:
 
     @property
     def prepared(self) -> list[Expression]:
-        """The values that ``prepare`` stores: the static expressions, then the entries of the matrices tA.
+        """The values that ``prepare`` stores: the expressions that depend only on parameters and the step size, then
+        the entries of the matrices tA.
 
         The generated code replaces each of these matrices, listed in `blocks`, by exp(tA) − 1.
         """
@@ -87,7 +89,7 @@ class Coefficients:
         self.exponentials += [e for e in dict.fromkeys(exponentials) if e not in self.exponentials]
 
     def empty(self) -> Coefficients:
-        """Return a table without values, for the same static symbols and inputs."""
+        """Return an empty table that accepts the same symbols as this table."""
         return Coefficients(self._static, self._inputs)
 
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
@@ -113,13 +115,16 @@ class Coefficients:
         replaced = fold(roots, visit)
         return [self.slot(self._written_out(r)) if hoisted[id(r)] else d for r, d in zip(roots, replaced, strict=True)]
 
-    def is_static(self, e: Expression) -> bool:
-        """Whether an expression contains only static symbols and inputs of a step, and hence does not depend on the
-        state."""
+    def is_state_independent(self, e: Expression) -> bool:
+        """Whether an expression does not depend on the state: all its symbols are parameters, the step size, or inputs
+        of a step such as the time.
+        """
         return all(name in self._static or name in self._inputs for name in symbols_of(e))
 
     def written_out(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the roots with all coefficients replaced by their expressions."""
+        """Return the expressions ``roots``, in which each symbol of a coefficient is replaced by the expression of the
+        coefficient.
+        """
         return [self._written_out(e) for e in roots]
 
     def slot(self, e: Expression) -> Expression:

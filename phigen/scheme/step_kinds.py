@@ -15,11 +15,14 @@ from dataclasses import dataclass
 class StepKind:
     """A kind of step: how it computes the new state.
 
-    ``title`` names the method in a sentence, ``manner`` in the header of generated files. ``unit`` says to what the
-    printed operation counts refer. ``implicit`` steps solve an equation for one point by an iteration. ``predicted``
-    steps start their iteration from a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a
-    row of coefficients for each of its times. A step that ``collocates`` solves for all its stages at once. Steps over
-    ``sites`` are those of lattices.
+    ``title`` names the method in a sentence, and ``manner`` names it in the header of generated files. ``unit`` says to
+    what the printed operation counts refer. The other fields are true or false:
+
+    - ``implicit``: each step solves an equation for one point by an iteration.
+    - ``predicted``: the iteration starts from a value extrapolated from earlier steps.
+    - ``flows``: each step has a schedule, and a row of coefficients for each duration in the schedule.
+    - ``collocates``: each step solves for all its stages at once.
+    - ``sites``: the steps are those of lattices.
     """
 
     name: str

@@ -155,8 +155,9 @@ class _Staged:
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of the flows of a splitting, of their derivatives and of their transposes; empty for other
-        steps."""
+        """The kernels of a splitting that compute flows, derivatives of flows, and transposed flows; empty for other
+        steps.
+        """
         return ()
 
     @property
@@ -197,7 +198,7 @@ class _Staged:
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of a step in all rows of the table; without a schedule there is one row."""
+        """The number of coefficients of one step. Steps without a schedule have one row of coefficients."""
         return self.row
 
     @property
@@ -235,10 +236,11 @@ class Factorisation:
 class Newton(_Staged):
     """Step by Newton's method: it solves α(y, ∇S_h(y)) = x for y; then x' = x + (β − α)(y, ∇S_h(y)).
 
-    ``linearise`` is one iteration. ``eliminate`` solves linear equations with the Newton matrix, and
-    ``eliminate_transposed``, if gradients were requested, equations with the transposed matrix. For many right-hand
-    sides there is ``invert``, ``factors``, or neither of the two. Where a kernel is None, the runtime uses a loop.
-    ``centred`` says that y is the mean of x and x'.
+    ``linearise`` is one iteration. ``eliminate`` solves linear equations with the Newton matrix. For gradients,
+    ``eliminate_transposed`` solves equations with the transposed matrix. ``invert`` and ``factors`` are for equations
+    with many right-hand sides: ``invert`` computes the inverse of the matrix, and ``factors`` computes its factors. At
+    most one of the two is present. Where a kernel is None, the runtime uses a loop. ``centred`` says that y is the mean
+    of x and x'.
     """
 
     linearise: Kernel
@@ -307,8 +309,11 @@ class PathLanes:
 
 @dataclass(frozen=True)
 class PathTangent:
-    """The recurrences of a path together with its variation (`phigen.scheme.tangent`), and the kernel of Hess S_h at
-    its mean."""
+    """Parts of a step along a path that its tangent map needs.
+
+    ``recurrences`` compute the path and its variation (`phigen.scheme.tangent`). ``curvature`` computes ∇S_h and Hess
+    S_h at the mean of the path.
+    """
 
     recurrences: Recurrences
     curvature: Kernel
@@ -368,8 +373,7 @@ class Path(_Staged):
 
 @dataclass(frozen=True)
 class GaussTangent:
-    """The Jacobians of two kernels of a Gauss step, for tangent maps: of ``slope``, the vector field of a stage, and of
-    ``change``.
+    """The Jacobians of the kernels ``slope`` and ``change`` of a Gauss step, for tangent maps.
 
     The derivatives are with respect to the start of the step and to the unknowns of a stage.
     """
@@ -382,10 +386,10 @@ class GaussTangent:
 class ReducedSweeps:
     """Sweeps over a part of the unknowns of a Gauss step; all lists contain indices of unknowns.
 
-    The derivatives of the ``iterated`` unknowns depend only on the ``followers``. The derivatives of the followers are
-    linear functions of the ``integrated`` unknowns, which are some of the iterated ones. Both kernels read the
-    integrals of the integrated unknowns from the start of the step to a stage. ``slope`` computes the derivatives of
-    the iterated unknowns, ``follow`` the followers.
+    The kernel ``slope`` computes the derivatives of the ``iterated`` unknowns. These derivatives depend only on the
+    ``followers``. The kernel ``follow`` computes the followers. The derivatives of followers are linear functions of
+    the ``integrated`` unknowns, which are some of the iterated ones. The two kernels read integrals of the integrated
+    unknowns, from the start of the step to a stage, divided by the step size.
     """
 
     slope: Kernel
@@ -421,8 +425,8 @@ class Gauss(_Staged):
     increments of logarithms or of group elements, and have the scale 1.
 
     ``lifted`` is the same step with the unknowns U = FG in place of the group elements G. The frame F is the value of U
-    at the start of the step. ``lifted`` is None if some group element has no frame. The frames are described by the
-    ``lift`` of this second step.
+    at the start of the step. The field ``lift`` of the step ``lifted`` describes the frames. ``lifted`` is None if some
+    group element has no frame.
     """
 
     slope: Kernel
@@ -479,7 +483,7 @@ class _Scheduled(_Staged):
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one step, in all rows."""
+        """The number of coefficients of one step. There is a row of coefficients for each duration in the schedule."""
         return self.row * len(self.schedule.times)
 
 
@@ -500,7 +504,7 @@ class Splitting(_Scheduled):
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of the flows, of their derivatives and of their transposes."""
+        """The kernels that compute flows, derivatives of flows, and transposed flows."""
         return (*self.flows, *self.tangents, *(self.adjoint.steps if self.adjoint else ()))
 
     def maps(self, stages: int) -> int:
@@ -529,9 +533,9 @@ class Seam:
     near: int = 0
 
     @property
-    def least(self) -> int:
-        """The smallest size of the axis from which on all sizes are allowed: the size of the longest seam, plus
-        ``wide`` sites.
+    def min_size(self) -> int:
+        """The smallest allowed size of the axis: the number of sites of the longest possible seam, plus the number
+        ``wide``.
         """
         return 2 * self.wide + self.period - 1
 
@@ -542,18 +546,19 @@ class Sites:
 
     ``places`` maps each symbol of kernels to a pair: the name of a field, or of a parameter with a value at each site,
     and an offset from the site. Offsets have one entry for each axis, the fastest axis last. The colour of a site is Σ
-    ``weights``·position modulo ``colours``. The sizes must be multiples of ``periods``, and at least ``least``.
-    ``open`` says which axes have open ends.
+    ``weights``·position modulo ``colours``. Three fields have one entry for each axis: ``periods``, ``min_sizes`` and
+    ``open_axes``. The size of an axis must be a multiple of its period, and not smaller than its minimal size.
+    ``open_axes`` says whether an axis has open ends.
     """
 
     axes: tuple[str, ...]
-    open: tuple[bool, ...]
+    open_axes: tuple[bool, ...]
     parameters: tuple[str, ...]
     places: Mapping[str, tuple[str, tuple[int, ...]]]
     colours: int = 1
     weights: tuple[int, ...] = ()
     periods: tuple[int, ...] = ()
-    least: tuple[int, ...] = ()
+    min_sizes: tuple[int, ...] = ()
     ends: Mapping[str, tuple[str, str]] = field(
         default_factory=dict
     )  # for bonds and pairs: symbol of kernels → (field, end of the bond)
@@ -599,13 +604,14 @@ class Gather:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of the terms of the sums, one for each of the ``ends``."""
+        """The kernels that compute the terms of the sums: one kernel for each item of ``ends``."""
         return tuple(e.kernel for e in self.ends)
 
 
 @dataclass(frozen=True)
 class Partners:
-    """Sums over the bonds or pairs of a site that are not part of a sweep, as functions of the parameters.
+    """Sums over the bonds or pairs of a site, as functions of the parameters. The sums of a sweep are in
+    `Sweep.gather`.
 
     ``energy`` has half of each energy, since each energy is counted at both of its sites. ``field`` has the forces or
     rates of the vector field. For steps that solve an `Equation`, ``varied`` has the forces, and their derivatives in
@@ -658,9 +664,9 @@ class Sweep:
     """Loop over the sites of a lattice that adds increments to the fields with the indices ``moved``.
 
     The sites are those of one ``colour``, or all sites if ``colour`` is None. A sweep reads no values that it changes.
-    If it is ``inside``, it omits the sites near seams. If it has a ``window``, it updates only sites near seams, by the
-    terms of H that start on the seams of certain axes. ``window`` is the bit mask of these axes; 0 stands for terms
-    that start on no seam. Sites before number ``first`` are not updated.
+    If ``omits_seams`` is true, the sweep omits the sites near seams. If ``window`` is not None, the sweep updates only
+    sites near seams, by the terms of H that start on the seams of certain axes. ``window`` is the bit mask of these
+    axes; 0 stands for terms that start on no seam. Sites before number ``first`` are not updated.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. A symbol of ``present`` is 1 or
     0. The symbol says whether a term of H stays within the open ends, or whether a site has the colour of the sweep.
@@ -673,7 +679,7 @@ class Sweep:
     colour: int | None = 0
     gather: Gather | None = None
     tangent: Sweep | None = None
-    inside: bool = False
+    omits_seams: bool = False
     window: int | None = None
     first: int = 0
 

@@ -33,7 +33,7 @@ def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, transpose: Ker
     neighbour_terms = [
         (name, value) for name, value in contributions if any(sites.places[name][1]) and not value.is_zero
     ]
-    if not neighbour_terms or any(sites.open) or step.partners or sites.colours > 1:
+    if not neighbour_terms or any(sites.open_axes) or step.partners or sites.colours > 1:
         return None
     updated = {fields[f] for f in sweep.moved}
     names = {place: name for name, place in sites.places.items()}

@@ -38,7 +38,7 @@ def band(step: Sweeps) -> int:
 
 def beside_seams(sweep: Sweep) -> bool:
     """Whether a sweep is restricted by boundary seams: it omits the sites near seams, or updates no others."""
-    return sweep.inside or sweep.window is not None
+    return sweep.omits_seams or sweep.window is not None
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
@@ -119,8 +119,9 @@ def takes(program: Program, step: Sweeps) -> bool:
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
     """Return for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
 
-    If the function `takes` returns true, the loop of the next flow adds them. Only the first flow of a step then needs
-    separate loops, because no flow follows it in the reverse pass.
+    If the function `takes` returns true, only the first flow of a step needs separate loops. The cotangents from any
+    other flow are added by the loop of the flow that follows in the reverse pass. The reverse pass of a step ends with
+    the first flow.
     """
     first = step.schedule.flows[0][0] if takes(program, step) else None
     return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
@@ -153,7 +154,7 @@ def givers(step: Sweeps) -> bool:
     Each row has a list of the rows that it reads. The two lists differ if an axis across rows has open ends: beyond an
     open end, a row reads a mirrored row with weight 0, but receives nothing.
     """
-    return any(step.sites.open[:-1])
+    return any(step.sites.open_axes[:-1])
 
 
 def starts_are_read(step: Sweeps) -> bool:

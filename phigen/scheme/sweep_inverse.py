@@ -57,8 +57,8 @@ def can_recompute_fields(program: Program, step: Sweeps) -> bool:
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
     """Return for each part of H the transposed kernels of its sweeps.
 
-    Where possible, they recompute the fields before the sweep, and each site collects the contributions of its
-    neighbours.
+    If the fields can be recomputed, each kernel also computes the values that the fields had before its sweep. Each
+    site then collects the contributions of its neighbours, if `collecting` allows this.
     """
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     invertible = can_recompute_fields(program, step)
@@ -92,7 +92,10 @@ def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
 
 
 def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
-    """Return a product without the factors of open ends that are 1 wherever there is a neighbour at ``offset``."""
+    """Return a product without some of its factors for open ends.
+
+    A factor is left out if it is 1 at every site that has a neighbour at ``offset``. `unweighted` explains the factors.
+    """
     if value.op in ("mul", "neg"):
         return rebuild(value, [_without_factors(e, offset) for e in value.args])
     if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:

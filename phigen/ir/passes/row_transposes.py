@@ -161,7 +161,7 @@ def _added_up(
     """
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
-    open_rows = prefix == "received" and any(layout.lattice.step.sites.open[:-1])
+    open_rows = prefix == "received" and any(layout.lattice.step.sites.open_axes[:-1])
     for h in handed:
         opposite = tuple(-o for o in h.offset)
         line = layout.line(opposite)

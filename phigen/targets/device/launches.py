@@ -13,7 +13,10 @@ def launches(program: Program, step: Sweeps) -> LatticeLaunches:
     """Return the data for launching the kernels of a lattice."""
     loops = LatticeLoops(program, step)
     parts = tuple(
-        tuple(SiteLaunch(s.kernel.name, _sums(s.gather), 0, _colour(s.colour, step), s.inside, s.window) for s in part)
+        tuple(
+            SiteLaunch(s.kernel.name, _sums(s.gather), 0, _colour(s.colour, step), s.omits_seams, s.window)
+            for s in part
+        )
         for part in step.parts
     )
     others = {}

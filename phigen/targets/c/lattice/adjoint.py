@@ -319,7 +319,7 @@ class _Reverse(RowLoops):
             arrays += len(one.gather.names) if one.gather else 0
             beside += listed
         near_ends = divides(tuple(first))
-        for array in sorted({h.array for h in beside if h.offset[-1]}) if not layout.step.sites.open[-1] else ():
+        for array in sorted({h.array for h in beside if h.offset[-1]}) if not layout.step.sites.open_axes[-1] else ():
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
         if beside and separate_loop:
             purpose = f"contributions to cotangents by the neighbours that {origin}"

@@ -109,7 +109,7 @@ def switches(layout: Layout) -> dict[str, bool]:
         "BETWEEN": (bool(weights) and program.profile == "fast")
         or any(wide(step.sites, sweep) for part in step.parts for sweep in part)
         or bool(step.sites.seams),
-        "OPEN_ROWS": step.sites.open[-1],
+        "OPEN_ROWS": step.sites.open_axes[-1],
         "HALO": layout.halo > 0,
         "PERIODIC_COLOURS": max(step.sites.periods, default=1) > 1,
         "SWEPT": program.profile != "fast",

@@ -276,11 +276,11 @@ def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, objec
     step, sites, several, fields = layout.step, layout.step.sites, not layout.single_row, layout.program.coordinates
     stages = [_braced(step.stage(k, fields)) for k in range(len(step.parts))] if has["BY_HAND"] else []
     return {
-        "least": ", ".join(map(str, sites.least)),
+        "least": ", ".join(map(str, sites.min_sizes)),
         "periods": ", ".join(map(str, sites.periods)) if has["PERIODIC_COLOURS"] else "",
         "several": several,
         "ends": several or has["BANDED"],
-        "open": ", ".join(str(int(o)) for o in sites.open),
+        "open": ", ".join(str(int(o)) for o in sites.open_axes),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
         "weights": ", ".join(
             _braced([_braced(pair) for pair in bounds(w.key)]) for w in layout.lattice.weights if several

@@ -361,7 +361,7 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
     two loops: one for sites away from the ends, and one for sites near them.
     """
     if sweep and beside_seams(sweep):
-        return [(loops[0], sites) for sites in ((AWAY,) if sweep.inside else (FIRST_SITES, LAST_SITES))]
+        return [(loops[0], sites) for sites in ((AWAY,) if sweep.omits_seams else (FIRST_SITES, LAST_SITES))]
     if len(loops) == 1:
         return [(loops[0], None)]
     inside, end = loops
