@@ -78,8 +78,11 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
 
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
-    """Return the quaternion of exp(p), or of the Cayley transform of p, minus 1; the translation follows unless ``t``
-    is empty."""
+    """Return the four components of q − 1, where q is the unit quaternion of exp(p) or, if ``cayley``, of the Cayley
+    transform of p.
+
+    Unless ``t`` is empty, the three components of the translation are appended.
+    """
     increment = direction(p, t, cayley=cayley)
     per = ONE / increment.length
     s = dot(p, p)

@@ -62,13 +62,15 @@ class Turning:
 
     @property
     def factors(self) -> list[Expression]:
-        """The summands whose group elements are applied in each flow of the part, except free rigid bodies."""
+        """The nonzero summands of the part, without free rigid bodies: ``terms``, preceded by ``casimir`` unless
+        ``put_back`` is set.
+        """
         turning = self.terms if self.put_back else (self.casimir, *self.terms)
         return [e for e in turning if not e.is_zero]
 
     @property
     def left(self) -> Expression:
-        """The summand whose rotation is applied once in a step: the Casimir if ``put_back`` is set, else 0."""
+        """The multiple of a Casimir by which the attitude is rotated once in a step; 0 unless ``put_back`` is set."""
         return self.casimir if self.put_back else ZERO
 
 
@@ -112,22 +114,27 @@ def _of_angle(function: str, sign: Expression, angle: Expression, *, double: boo
 
 
 def _of_square(function: str, square: Expression) -> Expression:
-    """Return ``sinroot`` or ``cosroot`` of 4s in terms of the values of both functions at s, the ``square``."""
+    """Return sinroot(4s) or cosroot(4s), computed from sinroot(s) and cosroot(s). The argument ``square`` is s.
+
+    The functions are sinroot(s) = sin(√s)/√s and cosroot(s) = cos √s; ``function`` is the name of one of them.
+    """
     sine = call("sinroot", square)
     return sine * call("cosroot", square) if function == "sinroot" else ONE - 2 * (square * sine**2)
 
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
-    """Return for each flow its part of H as a sum of functions with known group elements.
+    """Return, for each flow, its part of H as a sum of functions whose flows have known group elements.
 
-    Raises `SpecError` if phigen does not know this sum for a part; the error names the first part of this kind.
+    Raises `SpecError` if phigen knows no sum of this kind for a part; the message names the part.
     """
     return [_turning(system, group, flow, f"H_{k}", put_back=put_back) for k, flow in enumerate(flows, 1)]
 
 
 def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
-    """Return the part of a flow as a sum of functions with known group elements; ``name`` stands for the part in
-    messages."""
+    """Return the part of a flow as a sum of functions whose flows have known group elements.
+
+    In messages, ``name`` stands for the part.
+    """
     summands = flow.pieces or (flow,)
     bodies = tuple(summand.motion for summand in summands if isinstance(summand.motion, EulerMotion))
     remaining = [summand.hamiltonian for summand in summands if not isinstance(summand.motion, EulerMotion)]
@@ -139,10 +146,10 @@ def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: b
 def turning_of(
     system: System, group: Group, h: Expression, name: str, pieces: Sequence[Expression] = (), *, put_back: bool
 ) -> Turning:
-    """Return the function h as a sum of functions with known group elements; ``pieces`` are its commuting summands, if
-    any.
+    """Return the function h as a sum of functions whose flows have known group elements.
 
-    Raises `SpecError` with the ``name`` of h if phigen does not know this sum.
+    ``pieces`` has commuting functions with the sum h, or is empty. Raises `SpecError` if phigen finds no sum of this
+    kind; in the message, ``name`` stands for h.
     """
     orders = permutations(pieces) if len(pieces) <= MOST_PIECES else iter([tuple(pieces)])
     for candidate in chain(_candidates(system, group, h), (Turning(ZERO, order) for order in orders if order)):

@@ -8,7 +8,7 @@ of unit length,
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
 Let l, m, h be the axes with the lowest, the middle and the highest value of the E_i in `phigen.splitting.euler`, which
-also defines P, R, S, C, D and κ. Let z = Pκ² and L = |x|, and
+also defines P and R. S, C, D and κ are defined in `phigen.symbolic.elliptic`. Let z = Pκ² and L = |x|, and
 
     β_l = w_h − w_m,  β_m = w_l − w_h,  β_h = w_m − w_l,  c = β_h x_m² − β_m x_h²,  n = β_m c ≤ 0,
     W = (β_l x_m² − β_m x_l²)c/L²,  T = 4κ/(1 + z),  Q = P − R.
@@ -48,8 +48,9 @@ def rotates(group: Group) -> bool:
 
 
 def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expression]]:
-    """Return two group elements, minus 1, whose product is the element of the flow of a free rigid body for the time
-    ``t``."""
+    """Return two group elements, each minus 1. Their product is the group element of the flow of a free rigid body for
+    the time ``t``.
+    """
     weights = [derivative(derivative(motion.hamiltonian, name), name) for name in motion.coordinates]
     addition = motion.addition(t)
     x, changes = addition.x, addition.changes()
@@ -105,7 +106,7 @@ class _SortedAxes:
 
     @property
     def c(self) -> Expression:
-        """The constant c = β_h x_m² − β_m x_h², where x is the momentum and l, m, h are the axes."""
+        """The constant c = β_h x_m² − β_m x_h², in the notation of the head of the file."""
         _, of_m, of_h = self.betas
         return of_h * self.x[1] ** 2 - of_m * self.x[2] ** 2
 
@@ -116,16 +117,17 @@ class _SortedAxes:
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """Two factors in the formula for θ: w_l multiplies the time t, and −β_h n the elliptic integral."""
+        """The factors w_l of t and −β_h n of the integral, in the formula for θ at the head of the file."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the point in the plane whose polar angle is χ; its second coordinate is divided by L.
+        """Return the coordinates of the point with the polar angle χ at the head of the file. The second one is divided
+        by L.
 
-        The formula is that of this module. ``q``, ``s``, ``c`` and ``d`` are Q, S, C and D there, ``square`` is T², and
-        ``unit`` is 1. To avoid a division, ``unit`` and ``square`` may have a common factor, which does not change χ.
+        ``q``, ``s``, ``c`` and ``d`` are Q, S, C and D; ``square`` is T², and ``unit`` is 1. To avoid a division,
+        ``unit`` and ``square`` may be multiplied by the same number, which does not change χ.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse
@@ -135,10 +137,11 @@ class _SortedAxes:
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression in the independent symbols x_i, w_i and S.
+    """Yield pairs of a label and an expression. If all expressions are 0, the formulas at the head of the file are
+    correct.
 
-    All expressions vanish if the group element is that of the flow and x' is the momentum after the flow. The
-    identities of `phigen.splitting.euler` prove the second condition. The time derivative of S is CD.
+    The formulas contain the momentum x' after the flow; `phigen.splitting.euler` proves the formula for x'. The time
+    derivative of S is written as CD.
     """
     yield from _shortest_rotation()
     for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of one of these

@@ -83,10 +83,10 @@ class Group:
 
 
 def group_of(system: System, requested: str, kind: str) -> Group:
-    """Return the group of attitudes of a system for the value ``requested`` of ``reconstruct``, quaternion or matrix.
+    """Return the group of attitudes of a system.
 
-    ``kind`` is the kind of the bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if phigen knows no group
-    for its Lie algebra.
+    ``requested`` is the value of the key ``reconstruct`` in the spec: quaternion or matrix. ``kind`` is the kind of the
+    bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if phigen knows no group for its Lie algebra.
     """
     algebra = system.lie_algebra
     if algebra is None:
@@ -145,12 +145,12 @@ def _place(triple: Sequence[int], i: int) -> int:
 def _components(algebra: LieAlgebra, i: int, j: int, triple: Sequence[int]) -> dict[int, object]:
     """Return the components of [E_i, E_j] along three basis elements, by their positions in ``triple``."""
     row = algebra.bracket(i, j)
-    return _numbers({k: c for k, c in row.items() if k in triple}, triple)
+    return _by_position({k: c for k, c in row.items() if k in triple}, triple)
 
 
-def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
-    """Return the entries of a row by the position of their index in ``triple``; other indices have the position
-    −1.
+def _by_position(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
+    """Return the entries of a row, with their indices replaced by positions. The position of an index is its place in
+    ``triple``, or −1 if ``triple`` does not contain the index.
 
     Entries that are numbers become Python numbers.
     """
@@ -177,7 +177,7 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
         for b in range(3):
             c = 3 - a - b
             expected = {} if a == b else {c: sign if (b - a) % 3 == 1 else -sign}
-            if _numbers(algebra.bracket(rotation[a], translation[b]), translation) != expected:
+            if _by_position(algebra.bracket(rotation[a], translation[b]), translation) != expected:
                 return False
     return True
 

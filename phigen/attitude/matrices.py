@@ -67,8 +67,8 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
     rows = len(powers) + 1
     signed = [e if i % 2 == 0 else -ONE * e for i, e in enumerate(symmetric)]
     per = ONE / total(signed)
-    # The result is 2((1 − A)⁻¹ − 1): 2/Σ(−1)ⁱe_i times a combination of the powers 1, A, A², … of A. The factors in
-    # this combination are ``sums``; that of the unit matrix is −(−1)ᴺe_N.
+    # The result is 2((1 − A)⁻¹ − 1). By the formula of the docstring, it is 2/Σ(−1)ⁱe_i times a combination of 1, A,
+    # A², … ``sums`` has the coefficients of the combination; the first one is −(−1)ᴺe_N.
     sums = [-ONE * signed[rows], *(total(signed[: rows - k]) for k in range(1, rows))]
     return [2 * per * e for e in _combined(sums, powers)]
 
