@@ -134,11 +134,11 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 
 
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
-    """Yield the candidates for the module S of symmetric elements in a star algebra A = K ⊕ g ⊕ S ⊕ Z.
+    """Yield the candidates for the module S in the star algebra A = K ⊕ g ⊕ S ⊕ Z at the head of the file.
 
-    There is a candidate for each family, sl(n), so(n) or sp(2n), in which a Lie algebra has the dimension of g. Modules
-    with the smallest dimension come first. ``ad`` are the adjoint matrices of g, and ``centre`` is the dimension of the
-    centre of g.
+    Each of the families sl(n), so(n) and sp(2n) gives at most one candidate: the family must contain a Lie algebra with
+    the dimension of g. Modules with the smallest dimension come first. ``ad`` are the adjoint matrices of g, and
+    ``centre`` is the dimension of the centre of the whole Lie algebra, which is the sum of g and the centre.
     """
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
@@ -227,8 +227,8 @@ class _Module:
         action = [self._action(a, lowered, extract) for a in self.ad]
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
-        # These are the matrices of τ(·, f_l) for the basis elements f_l of S. τ maps g × S to g: it is the transpose of
-        # the projection σ of symmetric products to S.
+        # ``right_factors`` has the matrix of the map a ↦ τ(a, f) for each basis element f of S. The head of the file
+        # defines τ.
         right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:
@@ -326,10 +326,11 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by all basis elements of the star algebra K ⊕ g ⊕ S ⊕ Z.
+        """Return the matrices of left multiplication by all basis elements of the star algebra K ⊕ g ⊕ S ⊕ Z at the
+        head of the file.
 
-        ``left`` has the matrices for the basis elements of g. Elements of S and Z are combinations of products of
-        elements of g. Returns None if these products do not span S.
+        ``left`` has the matrices for the basis elements of g. The other matrices follow if products of elements of g
+        span S; otherwise the function returns None.
         """
         m, d, size = len(self.ad), len(self.tensors), self.size
         identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
@@ -418,10 +419,11 @@ def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat
 def _assembled(
     lie: LieAlgebra, module: _Module, left: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat
 ) -> StarAlgebra:
-    """Return the star algebra A = K ⊕ g ⊕ S ⊕ Z, from the matrices ``left`` of left multiplication by its basis.
+    """Return the star algebra A = K ⊕ g ⊕ S ⊕ Z at the head of the file. ``left`` has the matrices of left
+    multiplication by the basis elements of A.
 
-    The rows of ``basis`` are a basis of g: elements of [g, g], then one of the centre if there is a centre. ``inverse``
-    is the inverse of ``basis``.
+    The rows of ``basis`` are a basis of the Lie algebra ``lie``: first elements that span g = [lie, lie], then one of
+    the centre if there is a centre. ``inverse`` is the inverse of ``basis``.
     """
     field, size, simple, m = lie.field, module.size, len(module.ad), lie.dimension
 
@@ -431,7 +433,8 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # The star algebra has the basis 1, [g, g], S, z. In this order, row k of ``basis`` has the number row_numbers[k].
+    # The basis of the star algebra consists of 1, a basis of [lie, lie], a basis of S, and z. In this basis, row k of
+    # ``basis`` is the element with the index row_numbers[k].
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

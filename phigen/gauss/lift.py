@@ -46,7 +46,10 @@ def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
 
 
 def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
-    """Return the products of the basis elements 1, i, j, k of a copy."""
+    """Return the products of the basis elements 1, i, j, k of one copy of the quaternions.
+
+    ``copy`` has the indices of these basis elements. ``one`` is the number 1 in the field of the coefficients.
+    """
     u, i, j, k = copy
     products = {(u, u): {u: one}}
     for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
@@ -57,10 +60,10 @@ def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
 def momentum_form(
     algebra: StarAlgebra, copies: Sequence[Copy], element: Mapping[int, Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return the momentum k̃(U a U*) for a = ``element`` as a quadratic form in the components of U.
+    """Return k̃(U a U*) as a quadratic form in the components of U, where a is the argument ``element``.
 
-    The functional k̃ adds the k-components of all copies of the quaternions. The result maps pairs (i, j) with i ≤ j to
-    the coefficient of U_i U_j.
+    Both U and a are elements of the star algebra, a direct sum of copies of the quaternions. The functional k̃ adds the
+    k-components of all copies. The result maps pairs (i, j) with i ≤ j to the coefficient of U_i U_j.
     """
     unit, last = algebra.field.one, {copy[3] for copy in copies}
     form: dict[tuple[int, int], Scalar] = {}

@@ -25,11 +25,12 @@ Dual = list[Scalar]
 
 
 def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
-    """Return the attitude increment of a Gauss step as a function of the unknowns: its quaternion minus 1.
+    """Return the attitude increment of a Gauss step as a list of functions of the unknowns: the components of q − 1,
+    where q is a quaternion.
 
-    If the group has translations, the three components of the translation are added to the list. Returns None if the
-    coordinates that belong to rotations do not all belong to one group element, or if there is no homomorphism to dual
-    quaternions.
+    If the group of the attitude has translations, the three components of the translation are appended. Returns None if
+    the coordinates that belong to rotations do not all belong to one group element, or if there is no homomorphism to
+    dual quaternions.
     """
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):

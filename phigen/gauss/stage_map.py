@@ -42,10 +42,11 @@ class StageMap:
     unknowns.
 
     ``unknowns`` are names of symbols. Their order is: the offsets of the coordinates with the indices ``moved``; the
-    offset of the time if H depends on the time; the offsets of the functionals λ of star algebras with ideals; the
-    offsets of the logarithms of the coordinates with the indices ``scaled``; the components of the group elements,
-    minus 1 or minus the frame F. ``places`` has one tuple for each group element: the indices of its unknowns, then the
-    indices of the unknowns of its functional λ. ``change`` is x − x_start for each coordinate.
+    offset of the time if H depends on the time; the offsets of functionals λ; the offsets of the logarithms of the
+    coordinates with the indices ``scaled``; the components of the group elements, minus 1 or minus the frame F. There
+    is a functional λ for each star algebra with a square-zero ideal (`phigen.gauss.square_zero`). ``places`` has a
+    tuple of indices of unknowns for each group element: first the unknowns of the group element, then those of the
+    functional λ of its star algebra. ``change`` is x − x_start for each coordinate.
     """
 
     system: System
@@ -223,8 +224,8 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
 
     A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and the basis E_a of the Lie algebra. For
     G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, there is a functional λ =
-    x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. With frames, it is
-    the change of the quadratic form k̃(U E_a U*).
+    x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. If there is a frame
+    F, the change is that of the quadratic form k̃(U E_a U*) with U = FG (`phigen.gauss.lift`).
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
@@ -294,7 +295,11 @@ def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(wb)/q for an element w and the basis elements b of the star algebra; ``scaled`` has x̃/q."""
+    """Return x̃(wb)/q for an element w and all basis elements b of the star algebra.
+
+    x̃ is the functional of the momenta, and q a number. ``scaled`` has the values of x̃/q at the basis elements
+    (`_Scaled`).
+    """
     left = []
     for k in range(algebra.dimension):
         values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
@@ -307,7 +312,8 @@ def _with_star(
 ) -> Expression:
     """Return x̃(wfw*)/q for two elements w and f of the star algebra.
 
-    ``left`` has the values x̃(wb)/q at the basis elements b, as `_functional_times` returns them.
+    x̃ is the functional of the momenta, and q a number (`_Scaled`). ``left`` has the values x̃(wb)/q at the basis
+    elements b, as `_functional_times` returns them.
     """
     unit = algebra.field.one
     terms = []
@@ -433,11 +439,11 @@ def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Ex
 def _collected(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], slopes: Sequence[Expression], weight: Expression
 ) -> list[Expression | None]:
-    """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a of a group element, for w = ``weight``.
+    """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a of a group element G, for w = ``weight``.
 
-    E_a is the basis of the Lie algebra. Components that are affine in the momenta are written as linear combinations of
-    the values x̃(G f G*), with the elements f in ``frame`` of the `StarAlgebra`. This form needs fewer multiplications.
-    All other components are None.
+    E_a is the basis of the Lie algebra. A component that is affine in the momenta is written as a linear combination of
+    x̃(G f_k G*), which needs fewer multiplications. x̃ is the functional of the momenta, and f_k are the elements in
+    the field ``frame`` of `StarAlgebra`. All other components are None.
     """
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
@@ -479,11 +485,11 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return the vectors y with x̃(q) = y·Im q for all copies of the quaternions in star algebras, as a single
-    list.
+    """Return x̃(i), x̃(j) and x̃(k) for each copy of the quaternions in star algebras, as a single list.
 
-    The list has three components for each copy, in the order of i, j, k. At the start of a step, the frame F satisfies
-    F* k F = y (`phigen.gauss.lift`).
+    x̃ is the functional that the state x at the start of a step defines on a star algebra
+    (`phigen.gauss.star_algebra`). The frame F of a copy satisfies F* k F = y, where y is the vector of the three values
+    (`phigen.gauss.lift`).
     """
     values: list[Expression] = []
     for group in points.realisation.groups:
@@ -505,10 +511,10 @@ def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) ->
         algebra, offsets, k = group.algebra, offsets_of(points, places), [slopes[i] for i in places]
         element = offset_element(group, k)
         star = _element(algebra, algebra.star, offset_element(group, offsets))
-        turned = [a + b for a, b in zip(element, multiplied(algebra, star, element), strict=True)]
-        in_frame = [turned[i] for i in group.subalgebra]
+        element_rate = [a + b for a, b in zip(element, multiplied(algebra, star, element), strict=True)]
+        in_frame = [element_rate[i] for i in group.subalgebra]
         if group.ideal:
-            in_frame += _functional_in_next_frame(points, group, places, k[len(group.subalgebra) :], turned)
+            in_frame += _functional_in_next_frame(points, group, places, k[len(group.subalgebra) :], element_rate)
         for i, value in zip(places, in_frame, strict=True):
             values[i] = value
     return values
@@ -519,14 +525,14 @@ def _functional_in_next_frame(
     group: AlgebraBlock,
     places: Sequence[int],
     k: Sequence[Expression],
-    turned: Sequence[Expression],
+    element_rate: Sequence[Expression],
 ) -> list[Expression]:
     """Return the derivative of the functional λ in the frame of the next step; see `phigen.gauss.square_zero`.
 
-    ``k`` is the derivative of λ in the present step, at whose end the group element is G = g + n. ``turned`` is the
-    derivative ġ in the next step. The result has the entries k(bg*) − λ(sg*) for the basis elements b of the
-    subalgebra, where s is the symmetric part of ġb. The second term is subtracted since the functional of the next
-    step is 0 at s.
+    At the end of the present step the group element is G = g + n, with g in the subalgebra and n in the ideal. ``k`` is
+    the derivative of λ in the present step, and ``element_rate`` the derivative ġ in the frame of the next step. The
+    result has the entry k(bg*) − λ(sg*) for each basis element b of the subalgebra, where s is the symmetric part of
+    ġb. The second term is subtracted since the functional of the next step is 0 at s.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)
@@ -538,7 +544,7 @@ def _functional_in_next_frame(
     moved = dict(zip(group.subalgebra, k, strict=True))
     at_basis = [moved.get(i, ZERO) for i in n]
     w = offset_element(group, offsets_of(points, places))
-    shears = _pulled_back(group, turned, at_symmetric)
+    shears = _pulled_back(group, element_rate, at_symmetric)
     return [
         moved[i] + _with_star(algebra, units[i], at_basis, w) - shear
         for i, shear in zip(group.subalgebra, shears, strict=True)

@@ -214,7 +214,8 @@ def _differences(
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
     """Return the unknowns of ``points`` by name, as functions of the unknowns of ``complete``.
 
-    In ``complete``, all components of group elements are unknowns; in ``points``, functionals take the place of some.
+    In ``complete``, all components of group elements are unknowns. In ``points``, functionals λ replace the components
+    in square-zero ideals (`phigen.gauss.square_zero`).
     """
     first, size = len(points.moved) + len(points.system.times), len(points.scaled)
     common = [*range(first), *range(points.plain, points.plain + size)]
