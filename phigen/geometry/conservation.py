@@ -42,13 +42,12 @@ def rounding(steps: int) -> float:
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit in which errors of a quantity are measured: its ``size``, and its ``kind``.
+    """The unit in which errors of a quantity are measured: errors are divided by the number ``size``.
 
-    The kind says to what errors are relative: `RELATIVE` to the value of the quantity at the start, `TERMS` to the size
-    of its terms at the start, or `SITES` to the sum of the absolute energies of the sites at the start. Errors of the
-    kind `ABSOLUTE` are not relative to anything. ``terms`` is the size of the terms in this unit; rounding errors are
-    proportional to it. ``moves`` is true if time, forces or noise change the quantity, so that its changes are no
-    errors.
+    ``kind`` says what ``size`` is. `RELATIVE`: the absolute value of the quantity at the start. `TERMS`: the size of
+    its terms at the start. `SITES`: the sum of the absolute energies of the sites at the start. `ABSOLUTE`: 1.
+    ``terms`` is the size of the terms in this unit; rounding errors are proportional to it. ``moves`` is true if time,
+    forces or noise change the quantity, so that its changes are no errors.
     """
 
     size: float = 1.0
@@ -62,10 +61,10 @@ class Unit:
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """Return the errors, in this unit, of ``values`` of the quantity along a trajectory. Both arrays have the shape
-        (rows,).
+        """Return the errors of a quantity along a trajectory, in this unit.
 
-        ``start`` is the value of the quantity at the start.
+        ``values`` has the values of the quantity along the trajectory, and ``start`` is its value at the start.
+        ``values`` and the result have the shape (rows,).
         """
         with np.errstate(invalid="ignore"):  # values may be infinite or NaN, without warnings
             errors: Floats = np.abs(values - start) / self.size
@@ -75,16 +74,20 @@ class Unit:
 def units(
     quantities: Iterable[Expression], coordinates: Sequence[str], parameters: Mapping[str, float], start: Floats
 ) -> list[Unit]:
-    """Return the unit of each quantity, for a trajectory that starts at the state ``start`` of shape (DIM,)."""
+    """Return, for each quantity, the unit in which its errors along a trajectory are measured.
+
+    The trajectory begins at the state ``start`` of shape (DIM,).
+    """
     point_values = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
     values = (value_and_terms(q, coordinates, point_values) for q in quantities)
     return [unit_of(float(value), float(terms)) for value, terms in values]
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
-    """Return the units of the energy and of the Casimirs of a system, by name.
+    """Return the units in which errors of the energy and of the Casimirs along a trajectory are measured, by
+    name.
 
-    The trajectory begins at the state ``start`` (DIM,).
+    The trajectory begins at the state ``start`` of shape (DIM,).
     """
     quantities = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))
@@ -98,8 +101,9 @@ def moving(system: System) -> list[str]:
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
     """Return the unit in which the errors of a quantity are measured.
 
-    ``value`` is the quantity at the start of a trajectory, and ``terms`` is the size of the terms in its sum. If the
-    value is small compared with ``terms``, the unit is ``terms``, with the kind ``kind``: `TERMS` or `SITES`.
+    ``value`` is the quantity at the start of a trajectory, and ``terms`` is the size of the terms in its sum. If
+    ``value`` is small compared with ``terms``, errors are relative to ``terms``. The ``kind`` of the result is then the
+    argument ``kind``, which is `TERMS` or `SITES`.
     """
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))

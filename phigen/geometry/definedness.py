@@ -85,7 +85,9 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the value of an expression at a sample point is 0 up to rounding. Only then a proof is attempted."""
+    """Whether the value of an expression at a sample point is 0 up to rounding. Only in this case is a proof
+    attempted.
+    """
     names = symbols_of(e)
     for k in range(POINTS):
         try:

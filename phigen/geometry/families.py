@@ -117,7 +117,8 @@ def _aff(n: int) -> tuple[int, list[Entries]]:
     return n + 1, [_unit(i, j) for i, j in _all(n)] + [_unit(i, n) for i in range(n)]
 
 
-#: For each family, a function of the size n that returns the number of rows of the basis matrices and their entries.
+#: For each family, a function of the size n. It returns the number of rows of a basis matrix, and a list of the basis
+#: matrices.
 _BASES: dict[str, Callable[[int], tuple[int, list[Entries]]]] = {
     "so": _so, "se": _se, "sl": _sl, "gl": _gl, "su": _su, "sp": _sp, "heisenberg": _heisenberg, "aff": _aff,
 }  # fmt: skip

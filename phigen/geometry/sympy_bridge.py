@@ -152,7 +152,8 @@ def to_sympy(
     """Return an expression as a sympy object, for instance for ``sympy.latex``.
 
     ``symbols`` maps names to sympy symbols. Other names become real symbols, and the momentum of x becomes ``p_x``.
-    ``special`` makes the derivatives of φ: by name, in closed form or as a polynomial.
+    ``special(k, s)`` returns the k-th derivative of φ at s as a sympy object, as `named_function` and `closed_function`
+    do. φ is the function of `phigen.symbolic.special`.
     """
     return _Sympy(symbols or {}, special).values(familiar([e]))[0]
 

@@ -230,7 +230,9 @@ def build_system(
     forces: SpecForces | None = None,
     noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
-    """Return a `System` with these parts. The shape of π is recognised, and further Casimirs are searched for."""
+    """Return the `System` that the arguments describe. The shape of π is recognised, and further Casimirs are searched
+    for.
+    """
     locations = locations or {}
     declared = dict(casimirs or {})
     try:
