@@ -8,8 +8,8 @@ scalar product with x. Then α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)�
 
 This requires that P E_i P is in the algebra for all P and i. An equivalent condition is that E_a E_i E_b + E_b E_i E_a
 is in the algebra for all a, i, b. The condition holds for so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and
-heisenberg(n), but not for sl(3). In the article `PAPER` of `phigen.realisations.protocol`, example so(n), τ has 4
-instead of 2.
+heisenberg(n), but not for sl(3). The article `PAPER` of `phigen.realisations.protocol`, example so(n), has 4 instead of
+2 in both denominators of τ(P).
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from phigen.symbolic.readable import shortened
 KIND = "cayley"
 
 Sparse = dict[tuple[int, int], Scalar]
-#: The forms ⟨x, coordinates of P E_i P⟩ for all i: (i, a, b, k) with a ≤ b → coefficient of p_a p_b x_k in form i.
+#: The forms ⟨x, coordinates of P E_i P⟩ in the formula at the head of the file, for all i: (i, a, b, k) with a ≤ b →
+#: coefficient of p_a p_b x_k in form i.
 Trilinear = dict[tuple[int, int, int, int], Expression]
 
 
@@ -54,8 +55,9 @@ class _Escape:
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return the Cayley bi-realisation of a linear or affine π. The bi-realisation is symmetric.
 
-    Raises `SpecError` if π is neither linear nor affine, or if P E_i P is outside the algebra in every known faithful
-    representation. The message names the representations that were tried, with a product outside the algebra for each.
+    Raises `SpecError` if π is neither linear nor affine, or if no known faithful representation satisfies the condition
+    at the head of the file. In the second case, the message names the representations that were tried, with a product
+    outside the algebra for each.
     """
     dual = dual_of(system)
     if dual is None:

@@ -33,10 +33,6 @@ from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import sample_point
 
-#: Largest number of terms, as polynomials in p and x, of the components of M_p^k x. For larger components no closed
-#: form is tried.
-MOST_TERMS = 20_000
-
 Vector = list[Expression]
 
 
@@ -89,9 +85,11 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
-    """Return the closed form on an ideal that basis elements span, or on each direct summand of the ideal.
+    """Return the even part of b(M_p)x − x in closed form, for an ideal that is spanned by basis elements (see
+    `even_part`).
 
-    The direct summands need not be spanned by basis elements.
+    If there is no closed form for the whole ideal, the closed forms for its direct summands are added. The direct
+    summands need not be spanned by basis elements. Returns None if one of them has no closed form.
     """
     closed = _closed(ideal, x, p)
     if closed is not None:
@@ -139,7 +137,11 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
-    """Return s if 0 and −s may be the only eigenvalues of M², by the traces of M² and M⁴; else None."""
+    """Return a polynomial s in p, found under the assumption that 0 and −s are the only eigenvalues of M².
+
+    s follows from the traces of M² and M⁴. Returns None if the traces contradict the assumption. If they do not, the
+    caller must still prove it.
+    """
     n = range(len(matrix))
     if not _may_have_root(matrix):
         return None

@@ -36,8 +36,9 @@ class MatrixFunction(Arithmetic[Matrix]):
         self._argument, self._size, self._name = argument, len(argument), name
 
     def visit(self, node: Expression, args: list[Matrix]) -> Matrix:
-        """Return the value of a node from the values of its arguments. Raises `SpecError` for functions that are not
-        rational in P."""
+        """Return the value of a node from the values of its arguments, which are matrices. Raises `SpecError` for
+        functions that are not rational.
+        """
         if node.op == "symbol" and node.value == self._name:
             return self._argument
         if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):

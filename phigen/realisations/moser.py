@@ -23,7 +23,11 @@ from phigen.realisations.cotangent import Components, Cotangent, GradedForm, Gra
 
 @dataclass(frozen=True)
 class Step:
-    """A factor exp(Y) of the map ψ in Moser's trick. The vector field Y raises weights by ``weight``."""
+    """A factor exp(Y) of the map ψ in Moser's trick.
+
+    ``field`` is the vector field Y. The weight of a function or form is the number of its factors p and dp; the
+    derivative along Y raises the weight by ``weight``.
+    """
 
     weight: int
     field: Components

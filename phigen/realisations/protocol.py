@@ -60,7 +60,9 @@ class BiRealisation:
 
     @property
     def label(self) -> str:
-        """The kind as displayed to users; truncated series are marked as approximate."""
+        """The kind of the bi-realisation, as displayed to users. If the bi-realisation is a truncated series, the text
+        says that it is approximate.
+        """
         if self.exact:
             return self.kind
         return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")
@@ -112,5 +114,5 @@ def _operations(e: Expression) -> int:
 
 
 def refuse(message: str, hint: str = "") -> SpecError:
-    """Return the error of a kind that does not apply to a system; the caller adds the place in the spec."""
+    """Return the error for a bi-realisation that does not apply to a system; the caller adds the place in the spec."""
     return SpecError([Diagnostic(message, hint=hint)])

@@ -114,9 +114,9 @@ def _finite_series(spray: Spray, f: Poly) -> list[Poly] | None:
 
 
 def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, Expression]:
-    """Return the components of α − x and β − α for one coordinate.
+    """Return α_i − x_i and β_i − α_i for one coordinate x_i.
 
-    ``alpha`` has the parts of this component of α by degree in p. β follows from α, since β(x, p) = α(x, −p).
+    ``alpha`` has the parts of α_i by degree in p. β follows from α, since β(x, p) = α(x, −p).
     """
     displacement = space.tower.combine(f for k, f in alpha.items() if k > 0)
     odd = space.tower.combine(f for k, f in alpha.items() if k % 2)
@@ -176,7 +176,7 @@ def moser_steps(spray: Spray, degree: int) -> list[Step]:
 def alpha_series(spray: Spray, degree: int) -> list[GradedFunction]:
     """Return the components of α = τ∘Φ^{−½}∘ψ₀, each as its parts by degree in p, up to ``degree``.
 
-    Φ is the flow of the spray, τ(x, p) = x, and ψ₀ is the map of Moser's trick with ψ₀*Ω₀ = ω.
+    The head of the file defines the flow Φ and the maps τ and ψ₀.
     """
     space, result = spray.space, []
     steps = moser_steps(spray, degree)

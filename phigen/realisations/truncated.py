@@ -20,7 +20,7 @@ from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 
 #: Reason, for the user, why steps along paths are Poisson maps although the series are truncated.
-EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the proof"
+EXACT_PATH = "steps follow the exact path, so they are Poisson maps by Karasev's theorem"
 
 
 class _HomogeneousParts:
@@ -49,9 +49,9 @@ class _HomogeneousParts:
         return self._slopes[key]
 
     def bracket(self, e: int, f: int, degree: int) -> Poly:
-        """Return a homogeneous part of a bracket: the part of this ``degree`` in p.
+        """Return the part of degree ``degree`` in p of the bracket {E, F}.
 
-        The bracket is that of the expressions number ``e`` and number ``f``.
+        The expressions E and F have the numbers ``e`` and ``f`` in the list of expressions.
         """
         result = self.tower.zero
         for k in range(degree + 2):

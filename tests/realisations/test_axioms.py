@@ -273,5 +273,5 @@ def test_a_path_whose_series_is_too_large_to_expand_is_undecided_and_not_refused
     assert verdicts(statements[ALPHA:FORMS]) == [UNDECIDED] * 3
     assert (
         statements[ALPHA].detail
-        == "too many terms to expand; steps follow the exact path, for which Karasev's theorem is the proof"
+        == "too many terms to expand; steps follow the exact path, so they are Poisson maps by Karasev's theorem"
     )
