@@ -37,10 +37,11 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion along a vector field: systems of ``linear`` equations, and the rates of all ``other`` coordinates by
-    index.
+    """The motion along a vector field: linear differential equations for some coordinates, and time derivatives of the
+    others.
 
-    ``moving`` has the indices of the variables of the ring that are not constant.
+    ``linear`` has the systems of linear equations. ``other`` maps the index of a coordinate without linear equations to
+    its time derivative. ``moving`` has the indices of the variables of the ring that are not constant.
     """
 
     moving: frozenset[int]
@@ -51,7 +52,8 @@ class Motion:
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
     """Return the motion along a vector field.
 
-    A coordinate has linear equations if phigen finds any, else its rate. Constant coordinates are left out.
+    For each coordinate that is not constant, the motion has linear differential equations if phigen finds them,
+    otherwise the time derivative.
     """
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}

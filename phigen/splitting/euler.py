@@ -2,15 +2,15 @@
 positive and some negative.
 
 The differences of the E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max −
-min, and R the third E_i minus min. S, C and κ are the functions of `phigen.symbolic.elliptic`, evaluated at the time of
-the flow. Then the addition theorem of Jacobi's functions gives the state x' after the flow:
+min, and R the third E_i minus min. `phigen.symbolic.elliptic` defines κ as a function of t, P and R, and S and C as
+functions of κ and P. Then the addition theorem of Jacobi's functions gives the state x' after the time t:
 
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
 
-where σ_i > 0, except that σ_i = C for the smallest E_i. An error of κ changes only the time over which the body moves;
-energy and Casimirs stay constant. No phase is stored between steps, and no formula divides by the difference of two
-moments of inertia. So the separatrix, rotations about an axis and symmetric bodies are not special cases. Near the
-separatrix, R is as accurate as those x_i that are small there.
+where σ_i > 0, except that σ_i = C for the smallest E_i. The time enters only through κ. So an error of κ changes only
+the time over which the body moves; energy and Casimirs stay constant. No phase is stored between steps, and no formula
+divides by the difference of two moments of inertia. So the separatrix, rotations about an axis and symmetric bodies are
+not special cases. Near the separatrix, R is as accurate as those x_i that are small there.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -196,7 +196,10 @@ def _ends(
 
 
 def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression) -> list[Expression]:
-    """Return the x_i after the flow from the quantities σ_i, S and D (``divisor``) of the addition theorem."""
+    """Return the values of the x_i after the flow, by the addition theorem.
+
+    ``factors`` are the α_i; ``sigma``, ``s`` and ``divisor`` are σ_i, S and D in the formula at the head of the file.
+    """
     gaps = [sigma[j] * sigma[k] - divisor for j, k in CYCLIC]
     return [a + b for a, b in zip(x, _ends(x, factors, sigma, s, divisor, gaps), strict=True)]
 
@@ -204,9 +207,9 @@ def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Exp
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols x_i, α_i and S.
 
-    All expressions vanish if the increments are the flow. Let E_m be the largest E_i. Then σ_m = 1, and the other two
-    σ_j, σ_k are roots of 1 − (E_m − E_j)S². The time derivative of S is σ_j σ_k, which is CD for the elliptic
-    functions. The differences σ_j σ_k − D are also compared with their form for small S.
+    All expressions vanish if the increments solve the equations of motion. Let E_m be the largest E_i. Then σ_m = 1,
+    and σ_i = √(1 − (E_m − E_i)S²) for the other two indices i. The product of the two square roots is the time
+    derivative of S. Further expressions compare the two formulas for the differences σ_j σ_k − D in `Addition.changes`.
     """
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
     x, factors = ([symbol(name) for name in symbol_names] for symbol_names in (names[:3], names[3:]))
@@ -227,9 +230,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression for the functions S(κ), C(κ) and D of this module.
+    """Yield pairs of a label and an expression for the functions S and C of κ in `phigen.symbolic.elliptic`.
 
-    All expressions vanish if S satisfies dS/dt = CD. This must follow from dκ/dt = (1 + z)D/4 with z = Pκ².
+    All expressions vanish if three formulas hold: C² + PS² = 1; dS/dt = CD; and 1 − C = 8z/(1 + z)² with z = Pκ². The
+    second formula is derived from dκ/dt = (1 + z)D/4, where D is Jacobi's dn, not the D of this module.
     """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)

@@ -182,10 +182,10 @@ def _static_factor(ring: Ring, a: Matrix) -> Poly:
 def _circular(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −e²A^a, for a = 1 or 2.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −ω²A^a, for a = 1 or 2.
 
-    Let θ = te be the ``angle``. The matrix exp(tA) − 1 is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos
-    θ)A²/e² + (θ − sin θ)A³/e³ for a = 2. ``first`` is Aw. ``units`` are the vectors A^k w/e^k that these formulas
+    Let θ = ωt be the ``angle``. The matrix exp(tA) − 1 is sin(θ)A/ω + (1 − cos θ)A²/ω² for a = 1, and tA + (1 − cos
+    θ)A²/ω² + (θ − sin θ)A³/ω³ for a = 2. ``first`` is Aw. ``units`` are the vectors A^k w/ω^k that these formulas
     contain: for k = 1 and 2 if a = 1, for k = 2 and 3 if a = 2.
     """
     sine, versine = call("sin", angle), call("versin", angle)
@@ -199,10 +199,10 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = e²A^a, for a = 1 or 2.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = ω²A^a, for a = 1 or 2.
 
-    The arguments and the formulas are those of `_circular`, with sinh and cosh in place of sin and cos. In the
-    formulas, cosh θ − 1 is written as 2 sinh²(θ/2).
+    The arguments are those of `_circular`. Its formulas hold with three replacements: sinh θ for sin θ, cosh θ − 1 for
+    1 − cos θ, and sinh θ − θ for θ − sin θ. cosh θ − 1 is computed as 2 sinh²(θ/2).
     """
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:

@@ -333,7 +333,7 @@ def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]
 
 
 def _operations(ring: Ring, increments: Sequence[Expression]) -> int:
-    """Return the number of operations in the increments that depend on the state."""
+    """Return the number of operations whose results depend on the state, in the expressions ``increments``."""
     moving: set[int] = set()
     for e in topological(increments):
         if (e.op == "symbol" and e.value in ring.coordinates) or any(id(a) in moving for a in e.args):

@@ -6,9 +6,10 @@ Let μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|², and let s be th
     q' − q = g v − (μG2/r0) q,    p' − p = −(kG1/(r r0)) q − (μG2/r) p,
     g = r0 G1 + ηG2,    r = r0 + ηG1 + (μ − βr0)G2 = |q'|,
 
-where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. The factors are the coefficients f, g, ḟ, ġ of
-Lagrange, except that g is written without the time. So an error of s changes only the time over which the body moves,
-and not the energy. No formula divides by β or w: ellipses, parabolas, hyperbolas and both signs of k are covered.
+where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2, with cosroot(u) = cos √u and sinroot(u) =
+sin(√u)/√u. The formulas are those of Lagrange, in which g usually contains the time. Without the time in g, an error of
+s changes only the time over which the body moves, and not the energy. No formula divides by β or w: ellipses,
+parabolas, hyperbolas and both signs of k are covered.
 """
 
 from __future__ import annotations
@@ -149,10 +150,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols C, S, r0, η, β, w, k and one component of q
     and p.
 
-    All expressions vanish if the increments are the flow. The expressions are residuals of three equations: the
-    equations of motion of q and p, in which r stands for |q'|, and r² = |q'|². Time derivatives follow from ds = dt/r:
-    dS/dt = C/(2r) and dC/dt = −βS/(2r). The square |v|² is written as 2wk/r0 − β. The relation C² + βS² = 1 is
-    substituted as β = (1 − C²)/S².
+    All expressions vanish if the increments of q and p solve the equations of motion. The expressions are residuals of
+    three equations: the equations of motion of q and p, in which r stands for |q'|, and r² = |q'|². Time derivatives
+    follow from ds = dt/r: dS/dt = C/(2r) and dC/dt = −βS/(2r). The square |v|² is written as 2wk/r0 − β. The relation
+    C² + βS² = 1 is substituted as β = (1 − C²)/S².
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)

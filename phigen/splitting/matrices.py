@@ -23,8 +23,8 @@ from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import EXPONENTIAL, Symbol
 from phigen.symbolic.tower import Poly
 
-#: MOST_ROWS: the largest number of rows of A; each step multiplies a vector by the whole matrix. MOST_DEGREE: the
-#: largest number of factors in an unknown.
+#: MOST_ROWS: the largest number of rows of the matrix A of linear equations; each step multiplies a vector by the whole
+#: matrix. MOST_DEGREE: the largest degree of a monomial that is an unknown of the equations.
 MOST_ROWS, MOST_DEGREE = 64, 8
 
 #: PADE: the coefficients of the numerator of the Padé approximant of order 6 for exp. MAX_PADE_NORM: the largest norm
@@ -81,7 +81,9 @@ class MatrixExponential:
 
 @dataclass(frozen=True)
 class StaticSolution:
-    """The increments of the coordinates of a linear motion, and the matrix exponential whose symbols they contain."""
+    """The increments of the coordinates of a linear motion. In ``increments``, symbols stand for the entries of the
+    matrix ``exponential``.
+    """
 
     increments: tuple[Expression, ...]
     exponential: MatrixExponential
@@ -108,10 +110,11 @@ def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
 
 
 def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomial, Poly]] | None:
-    """Return linear equations whose coefficients depend on parameters only: unknown → (unknown → coefficient).
+    """Return linear differential equations whose coefficients depend on parameters only. The equation ż = Σ c_k z_k is
+    the entry z → (z_k → c_k) of the result.
 
-    The unknowns are products of the monomials of the motion with values that are constant along the flow. Returns None
-    if the number or the degree of the unknowns exceeds the limits.
+    The unknowns z are products of the monomials of the motion with values that are constant along the flow. Returns
+    None if the number or the degree of the unknowns exceeds the limits.
     """
     matrix = {
         m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}

@@ -146,7 +146,7 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
 
 
 def is_inverse_distance(generator: Generator) -> bool:
-    """Whether a variable of the ring stands for one over a square root."""
+    """Whether a variable of the ring stands for the inverse of a square root, 1/√u."""
     return generator.kind == "root" and generator.degree == 2 and generator.inverse
 
 

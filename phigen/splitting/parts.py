@@ -99,7 +99,8 @@ def _invariants(system: System, ring: Ring) -> list[Poly]:
 def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
     """Return the number of invariants that change along the flow of at least one part.
 
-    For example, s_1 + s_2 is constant along the flow of s_1·s_2, but not along that of x_1 x_2.
+    For example, let (x_i, y_i, z_i) be two spins, i = 1, 2. Their sum is constant along the flow of their scalar
+    product x_1 x_2 + y_1 y_2 + z_1 z_2, but not along the flow of the single term x_1 x_2.
     """
     sums = [ring.tower.combine(t.element for t in part) for part in parts]
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)

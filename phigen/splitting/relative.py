@@ -112,9 +112,9 @@ class RelativeMotions:
         """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
         motion.
 
-        ``spread`` converts changes of Q_i and P_i to changes of Cartesian coordinates. The first expressions vanish if
-        the linear forms Q_i and P_i convert the result back to the original changes. The other expressions are the
-        identities of Kepler motions.
+        ``spread`` converts changes of Q_i and P_i to changes of Cartesian coordinates. The definitions of Q_i and P_i
+        convert in the opposite direction. The first expressions vanish if the second conversion is the inverse of the
+        first one. The other expressions are the identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
@@ -133,8 +133,12 @@ class RelativeMotions:
     def _spread(
         self, names: Sequence[str], values: Sequence[tuple[list[Expression], list[Expression]]], of_centre: Vector
     ) -> list[Expression]:
-        """Return the changes of the coordinates ``names`` from the changes of all Q_i, all P_i and the centre of
-        mass."""
+        """Return the changes of the Cartesian coordinates ``names``, computed from changes of relative
+        coordinates.
+
+        ``values`` has a pair for each i: the changes of Q_i and of P_i. ``of_centre`` is the change of the centre of
+        mass.
+        """
         axes = len(of_centre)
         changes: dict[str, Expression] = dict(zip(_names("R", 0, axes), of_centre, strict=True))
         for i, pair in enumerate(values, 1):
@@ -173,14 +177,14 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
     return RelativeMotions(a, tuple(motions), momenta[-1], inverse[-1], spread, tuple(_independent(masses, mass))), b
 
 
-def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield pairs: a mass, and the expression that replaces the mass in proofs.
+def _independent(masses: Sequence[Expression], sums: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
+    """Yield pairs: an expression that contains masses, and the expression that replaces it in proofs.
 
-    A sum M_i becomes a symbol. A mass m_i becomes M_i − M_{i−1}, a difference of two symbols. Masses that are numbers
-    are left as they are.
+    The sum M_i = m_0 + … + m_i is replaced by a symbol, and the mass m_i by M_i − M_{i−1}, a difference of two symbols.
+    ``sums`` are the M_i. Masses that are numbers are left as they are.
     """
     previous = ZERO
-    for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):
+    for i, (m, sum_of_masses) in enumerate(zip(masses, sums, strict=True)):
         if m.is_number:
             previous = previous + m
             continue
@@ -220,13 +224,14 @@ def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, 
 def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) -> dict[str, Expression]:
     """Return the changes of Cartesian coordinates as linear forms of the changes of Jacobi coordinates.
 
-    Let R_i be the centre of mass and T_i the total momentum of the bodies 0, …, i, and s_i = m_i/M_i. From the last
-    body to the first, R_{i−1} = R_i − s_i Q_i, q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i and T_{i−1} = T_i − p_i. The
-    total momentum T_N does not change.
+    The Cartesian coordinates q_i, p_i follow from the Jacobi coordinates Q_i, P_i, from the last body to the first:
+    R_{i−1} = R_i − s_i Q_i, q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i and T_{i−1} = T_i − p_i. Here M_i is the mass, R_i
+    the centre of mass and T_i the total momentum of the bodies 0, …, i, and s_i = m_i/M_i. The total momentum T_N does
+    not change.
 
-    The masses occur as s_i only, here and in the forms Q_i and P_i. So this map is exactly inverse to the forms, and
-    canonical, even if the s_i are rounded. With several different quotients of masses, rounding errors would cause a
-    drift of the energy.
+    The masses occur as s_i only, here and in the definitions of Q_i and P_i. So this map is exactly inverse to the
+    definitions, and canonical, even if the s_i are rounded. With several different quotients of masses, rounding errors
+    would cause a drift of the energy.
     """
     spread = dict[str, Expression]()
     centre: list[Expression] = changes_of("R", 0, bodies.axes)
@@ -272,7 +277,7 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: The functions that return the division H = A + B, by the name that specs have for the relative coordinates.
+#: Name of the relative coordinates in specs → function that returns the division H = A + B.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

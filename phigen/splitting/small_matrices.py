@@ -19,7 +19,7 @@ from phigen.symbolic.expression import call, symbol, total
 from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.tower import Poly
 
-#: Largest number of rows of A.
+#: Largest number of rows of a matrix A to which the formulas of this module apply.
 MOST_ROWS = 4
 
 #: Description of the motion, for reports.
@@ -52,10 +52,10 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
 
 
 def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return the increments for a matrix A with two rows, by functions of s = dt², where (A − τ/2)² = −d with the trace
-    τ of A.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw for a matrix A with two rows.
 
-    1 − cos √s is computed as s sinroot(s/4)²/2.
+    The formula for exp(tA) is the last one at the head of the file. Let s = d·t² with the d of this formula. 1 − cos √s
+    is computed as s sinroot(s/4)²/2, where sinroot(s) = sin(√s)/√s.
     """
     (a, b), (c, d) = motion.matrix
     half_trace = ring.tower.constant(Fraction(1, 2)) * (a + d)
