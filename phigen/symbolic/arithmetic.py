@@ -22,7 +22,7 @@ class Arithmetic(Generic[T]):
     """
 
     def constant(self, value: Fraction) -> T:
-        """Return the value of a rational number."""
+        """Return a rational number as a value of type T."""
         raise NotImplementedError
 
     def variable(self, name: str) -> T:

@@ -38,8 +38,8 @@ AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2"
 #: head of the module defines it.
 THIRD = "amplitude3"
 
-#: For Pt² ≤ 1, the power series of S is evaluated at t/2^DOUBLINGS, with TERMS terms, and the argument is then doubled
-#: DOUBLINGS times. At t/16 the omitted terms are below 10⁻¹⁸.
+#: If Pt² ≤ 1, generated code sums TERMS terms of the power series of S at t/2^DOUBLINGS, and then doubles the time
+#: DOUBLINGS times. The head of the module defines P and S. At t/16 the omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
 #: The arithmetic–geometric mean is the limit of the iteration a, b → (a + b)/2, √(ab). Let c = (a − b)/2. The iteration
@@ -162,9 +162,10 @@ def _amplitude(library: Any, u: Any, k: Any) -> Any:
 
 
 def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, Any, Any], Any]) -> Any:
-    """Return the integral, from 0 to t, of S² times a function of S², by a formula of Carlson.
+    """Return ∫ S² f dt from 0 to t, where f is 1, 1/D² or 1/(1 − nS²). The head of the module defines S and D.
 
-    The integral is S³/3 times an elliptic integral of Carlson, which ``carlson_of`` computes from C², D² and S².
+    The integral is S³/3 times an elliptic integral of Carlson. ``carlson_of``, which is different for each f, computes
+    the elliptic integral from C², D² and S².
     """
     if p <= 0:
         return t**3 / 3

@@ -42,7 +42,7 @@ _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
 #: An expression with this number of nodes is large: a walk over it takes a tenth of a second or more, and reports
 #: progress.
-MANY = 10_000
+LARGE_GRAPH = 10_000
 
 Number = int | Fraction
 T = TypeVar("T")
@@ -440,8 +440,8 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
 
 
 def _with_progress(order: Sequence[Expression]) -> Iterable[Expression]:
-    """Return the nodes as an iterable, which reports progress if there are `MANY` nodes or more."""
-    if len(order) < MANY:
+    """Return an iterable over the nodes. It reports progress if there are at least `LARGE_GRAPH` nodes."""
+    if len(order) < LARGE_GRAPH:
         return order
 
     def counted() -> Iterator[Expression]:
@@ -467,8 +467,8 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with internal functions of phigen replaced by well-known ones, for instance cosroot(s) by cos
-    √s.
+    """Return the expressions ``roots`` with well-known functions in place of internal functions of phigen; for
+    instance, cos √s replaces cosroot(s).
 
     If a replacement has two forms, for positive and for negative arguments, the form for positive arguments is used.
     """

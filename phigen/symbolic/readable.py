@@ -184,7 +184,7 @@ def infix(e: Expression) -> str:
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """Return the expressions with symbols that phigen added replaced by their names for display (`plain`)."""
+    """Return the expressions, in which each symbol that phigen added is replaced by its name for display (`plain`)."""
     internal = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
     return substitute(expressions, {n: symbol(plain(n)) for n in internal})
 

@@ -75,9 +75,10 @@ def value(k: int, library: Any, t: Any, *a: Any) -> Any:
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return G_k: Σ G_k x^k is the remainder of the quotient (e^{tx} − 1 − Σ F_k x^k)/p on division by p.
+    """Return the coefficient G_k of x^k in the remainder of Q on division by p.
 
-    Here p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0, and F_k is the result of `value`, where ``library`` is explained.
+    Here p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0 and Q = (e^{tx} − 1 − Σ F_k x^k)/p. `value` computes F_k; its docstring
+    explains ``library``.
     """
     return _coefficients(library, t, a)[1][k]
 

@@ -58,7 +58,10 @@ def near_coefficients(order: int) -> list[float]:
 
 
 def lane_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of φ, φ′ or φ″ that SIMD code needs, the constant one first."""
+    """Return the Taylor coefficients that SIMD code needs for φ, φ′ or φ″, the constant coefficient first.
+
+    ``order`` is the number of primes; `coefficient` defines φ.
+    """
     return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
@@ -76,7 +79,9 @@ def rest_coefficients(order: int) -> list[float]:
 
 
 def in_double(order: int, s: float) -> float:
-    """Return the derivative of φ (see `coefficient`) of this order at s, by the algorithm of generated code."""
+    """Return a derivative of φ at s by the algorithm of generated code. ``order`` is the order of the derivative, and
+    `coefficient` defines φ.
+    """
     if abs(s) < NEAR:
         return _polynomial(near_coefficients(order), s)
     if abs(s) < MIDDLE:
@@ -87,8 +92,10 @@ def in_double(order: int, s: float) -> float:
 
 
 def precisely(context: Any, order: int, s: Any) -> Any:
-    """Return the derivative of φ (see `coefficient`) of this order in an mpmath context. The last two digits may be
-    wrong.
+    """Return a derivative of φ at s in an mpmath context. ``order`` is the order of the derivative, and `coefficient`
+    defines φ.
+
+    The last two digits may be wrong.
     """
     if abs(s) < 1:
         terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
@@ -102,7 +109,7 @@ def precisely(context: Any, order: int, s: Any) -> Any:
 
 
 def value(library: Any, order: int, s: Any) -> Any:
-    """Return the derivative of φ (see `coefficient`) of this order at s.
+    """Return a derivative of φ at s; ``order`` is the order of the derivative, and `coefficient` defines φ.
 
     ``library`` is `math`, for double precision, or an mpmath context, for the precision of this context.
     """

@@ -42,13 +42,15 @@ class RingOperations(Protocol):
         """Return a·b. Raises `OverflowError` if the product may be larger than memory."""
 
     def constant(self, value: int | Fraction) -> Any:
-        """Return a rational number as an element."""
+        """Return a rational number as an element of the ring."""
 
     def variable(self, name: str) -> Any:
-        """Return a symbol as an element."""
+        """Return a symbol as an element of the ring."""
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """Return the value of an elementary function at elements; without arguments, the constant ``pi`` or ``E``."""
+        """Return the value of an elementary function at elements of the ring; without arguments, the constant ``pi`` or
+        ``E``.
+        """
 
     def power(self, base: Any, exponent: Fraction | int) -> Any:
         """Return a rational power of an element."""

@@ -281,8 +281,10 @@ class Tower(Arithmetic[Poly]):
         return cos if name == "cosroot" else sin
 
     def _special(self, order: int, s: Poly) -> Poly:
-        """Return φ(s), φ'(s) or φ''(s) for an element s; the Riccati equation of φ expresses φ' and φ'' by φ and
-        1/s."""
+        """Return φ(s), φ'(s) or φ''(s) for an element s of the ring; ``order`` is the number of primes.
+
+        `phigen.symbolic.special` defines φ. By the Riccati equation of φ, φ' and φ'' are polynomials in φ, s and 1/s.
+        """
         if s.is_constant() and s == 0:
             return self.constant(coefficient(order, 0))
         phi = self._generator("phi0", [s])
@@ -584,7 +586,8 @@ class Tower(Arithmetic[Poly]):
     def _parts(self, element: Poly, name: str) -> dict[int, Poly]:
         """Return the element as a polynomial in the generator ``name``: {exponent: coefficient}.
 
-        The divisions are done by the C library, which is faster than a loop over terms in Python.
+        The coefficients are found by divisions by powers of the generator. The C library divides faster than a loop
+        over terms in Python.
         """
         i, parts = self._index[name], dict[int, Poly]()
         while (exponent := int(element.degrees()[i])) > 0:

@@ -4,7 +4,8 @@ For q̈ = −μq/|q|³, let r = |q|, η = q·q̇ and β = 2μ/r − q̇² at the
 
     r G1 + η G2 + μ G3 = t,    G1 = s sinroot(βs²),  G2 = s² sinroot(βs²/4)²/2,  G3 = s³ arcroot(βs²)
 
-(E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). The G_n are functions of Stumpff: G0 is
+(E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). Here sinroot(u) = sin(√u)/√u, cosroot(u) = cos
+√u and arcroot(u) = (√u − sin √u)/√u³; these functions are analytic for all u. The G_n are functions of Stumpff: G0 is
 cosroot(βs²), G0' = −βG1 and G_n' = G_{n−1}. The derivative of the left-hand side with respect to s is the distance at
 s, r G0 + η G1 + μ G2 > 0, so there is one solution. The derivatives of s follow by differentiating the equation; no
 formula divides by β.
@@ -23,8 +24,8 @@ ANOMALY = "anomaly"
 #: iterations for double precision.
 MOST_ITERATIONS = 100
 
-#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. The relative rounding error of q × q̇
-#: is about 10⁻¹⁵; its square is 10⁻³⁰.
+#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r, where η = q·q̇ and r = |q|. The
+#: relative rounding error of q × q̇ is about 10⁻¹⁵; its square is 10⁻³⁰.
 RADIAL = 1e-30
 
 

@@ -62,10 +62,12 @@ class Statement:
 def decide_zero(
     name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its verdict.
+    """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its
+    verdict.
 
-    ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the part in a refutation.
-    ``positive`` are the symbols that take positive values only. ``detail`` is the detail of a proved statement.
+    ``residuals`` are pairs (label, expression). If the statement is refuted, its text contains the label of a residual
+    that does not vanish, such as ``(x1, x2, x3)``. ``positive`` are the symbols that take positive values only.
+    ``detail`` is the detail of a proved statement.
     """
     nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:
