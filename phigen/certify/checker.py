@@ -152,9 +152,10 @@ class Evaluation:
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
             # "rest" adds an error for the omitted terms of a Taylor series. The C may omit the terms a[3:], and omits
-            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound for the coefficient
-            # of the order of a[3], on a box that contains the path: by Lagrange's form of the remainder, it bounds the
-            # sum of all terms from a[3] on. The divisor of these terms is at least a[2].
+            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that
+            # contains the path, for the Taylor coefficient of the same order as a[3]. By Lagrange's form of the
+            # remainder, tail also bounds the sum of all terms from a[3] on. The divisors of the omitted terms are at
+            # least a[2].
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -244,16 +245,16 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
     return run
 
 
-def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return intervals for the outputs of a stage that ``stage[of]`` lists, rounding errors included.
+def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, key: str) -> Matrix:
+    """Return intervals for the outputs with the indices ``stage[key]``, rounding errors included.
 
-    The mean value theorem, applied at the midpoints of X and of ``box``, gives narrower intervals for small boxes than
-    `run_of`, whose result is ``run``. X contains the states, and ``box`` the unknowns.
+    X contains the states, and ``box`` the unknowns. The mean value theorem is applied at the midpoints of X and of
+    ``box``. For small boxes the intervals are narrower than those in ``run``, the result of `run_of`.
     """
-    _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
+    _, error, by_u, by_x = run.outputs(stage[key], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
     at = run_of(c, stage, x, T, leaf, u, exact=True)
-    values = column(at.x[k] for k in stage[of]) + by_u * (column(box) - column(u)) + by_x * (column(X) - column(x))
+    values = column(at.x[k] for k in stage[key]) + by_u * (column(box) - column(u)) + by_x * (column(X) - column(x))
     return each(lambda v, e: v + BALL * e, values, error)
 
 
@@ -303,22 +304,22 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
 
     def residual_error(e: Matrix) -> Matrix:
-        """Return bounds for the rounding errors of the residual, if the distance of u from the solution is at
+        """Return bounds for the rounding errors of the residual, if the unknowns differ from the solution by at
         most e.
         """
         first = d_error + U * (size + e + c["carry"] * U * Y) * based
         return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """Return bounds for the distance of u from the solution after a correction, if this distance was at most e
-        before it.
+        """Return bounds for the distance between the unknowns and the solution after a correction. Before the
+        correction, this distance is at most e.
         """
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """Return bounds for the distance of u from the solution, if the correction or residual that the C has measured
-        is at most ``size``.
+        """Return bounds for the distance between the unknowns and the solution, if the C measures a correction or a
+        residual of at most ``size``.
         """
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
@@ -364,9 +365,10 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
     """Return bounds for the contraction rate and the rounding errors of the corrections of an implicit stage.
 
     The bounds are in the norm by which the C measures corrections: for a Gauss method the root mean square over the
-    stages of the method, otherwise the maximum. The third result is the 2-norm divided by this root mean square, or 1.
-    ``factor`` is a matrix: |correction| ≤ factor · |previous correction|, apart from the rounding errors ``noise``.
-    ``low`` and ``high`` are bounds for the sizes by which corrections are divided.
+    stages of the method, otherwise the maximum. For a Gauss method, the third result is the square root of the number
+    of stages: the quotient of 2-norm and root mean square. Otherwise the third result is 1. ``factor`` is a matrix:
+    |correction| ≤ factor · |previous correction|, apart from the rounding errors ``noise``. ``low`` and ``high`` are
+    bounds for the sizes by which corrections are divided.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]

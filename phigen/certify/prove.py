@@ -70,10 +70,11 @@ class NoCertificateError(RefusedError):
 class StepProblem:
     """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
 
-    ``text`` is the C; ``members`` maps names of parameters in C to those of the spec. ``gauge`` has the multiples of
-    Casimirs that are subtracted from H or, with a monitor, the energy level e. ``ulps`` is a bound for the errors of
-    functions of libm. A certificate with an error bound above ``within`` is not accepted. ``ulps`` and ``within`` are
-    in units in the last place. ``timed`` says that steps depend on the time.
+    ``text`` is the C; ``members`` maps names of parameters in C to those of the spec. With a monitor, ``gauge``
+    contains one number, the energy level e. Otherwise ``gauge`` contains the multiples of Casimirs that are subtracted
+    from H. ``ulps`` is a bound for the errors of functions of libm. A certificate with an error bound above ``within``
+    is not accepted. ``ulps`` and ``within`` are in units in the last place. ``timed`` says that steps depend on the
+    time.
     """
 
     name: str

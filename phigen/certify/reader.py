@@ -301,8 +301,8 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Kind of step → names of the C functions that are read. For a kind, its last function is decisive: a solver has the
-#: first of these kinds for which its C has this function.
+#: Kind of step → names of the C functions that are read. The last function of a kind identifies this kind. If the C has
+#: the last functions of several kinds, the kind that is listed first counts.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),

@@ -104,10 +104,11 @@ class _Gauge(dict[int, int]):
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the operations that compute the coefficients of a stage, and return the indices of the coefficients.
+    """Append the operations that compute the coefficients of a stage, and return the indices of the
+    coefficients.
 
-    The coefficients depend on parameters, step size and time. In a splitting, ``stage`` is the number of a duration;
-    all flows of this duration have the same coefficients.
+    The coefficients depend on parameters, step size and time. In a splitting, ``stage`` is the number of a row of
+    coefficients. Several flows of a step may use the same row.
     """
     step = listing.input("constant", "step")
     h = step
