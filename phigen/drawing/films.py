@@ -88,7 +88,8 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
 
 
 def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
-    """Draw a coordinate on a chain or plane in its first frame. Return a function that draws another frame instead.
+    """Draw the first frame of a coordinate: a chain as a curve, a plane as an image. Return a function that draws
+    another frame in its place.
 
     ``values`` (frames, *sizes) has the values of the coordinate in all frames.
     """

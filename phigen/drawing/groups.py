@@ -12,8 +12,8 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
     """Return the coordinates in groups of up to three, in order. A group of one coordinate is drawn over time.
 
     Up to three coordinates are one group. More coordinates are first paired by their names: a position with its
-    momentum, such as q with p, q1 with p1, or x with px. If all coordinates are paired, the groups are the pairs. An
-    exception are two pairs: then one group has the two positions, which show the orbit in a plane, and one group has
+    momentum, such as q with p, q1 with p1, or x with px. If all coordinates are paired, the groups are the pairs. Two
+    pairs are an exception: one group has the two positions, which show the orbit in a plane, and the other group has
     the two momenta. If a coordinate remains unpaired, successive names with the same letters, or with the same number,
     form a group. Long groups are split.
     """

@@ -243,9 +243,9 @@ def _snapshots(run: LatticeTrajectory) -> Any:
 
 
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
-    """Draw one coordinate of a plane at several times.
+    """Draw ``values`` (frames, *sizes) on a lattice with two axes, as images at several times.
 
-    If the lattice has three dimensions, the plane in the middle of the first axis is drawn.
+    If the lattice has three axes, the plane in the middle of the first axis is drawn.
     """
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
