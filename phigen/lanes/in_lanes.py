@@ -45,8 +45,8 @@ PACKS_PER_GROUP = 4
 #: of three steps.
 MEMBER_BATCHES = 4
 
-#: Largest numbers of stages for which members of an ensemble are integrated in batches. The second number applies if
-#: kernels call functions, and if single trajectories iterate only a part of the unknowns
+#: Largest numbers of stages for which members of an ensemble are integrated in batches. The second number applies under
+#: two conditions together: kernels call functions, and single trajectories iterate only a part of the unknowns
 #: (`phigen.scheme.steps.ReducedSweeps`). A batch iterates all unknowns, which takes longer. Measured time in batches,
 #: divided by the time without batches: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with
 #: four stages, 0.6 with two.
@@ -76,8 +76,8 @@ class Blocks:
     ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if the kernels call no library
     function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. For steps
     along paths, ``path`` has the recurrences for the derivatives of a path. The Taylor series of the derivatives have
-    at most ``slope_terms`` terms. ``room`` is the number of values in each lane that a group of members needs, without
-    the values of predictors.
+    at most ``slope_terms`` terms. ``room`` is the number of values that a group of members needs in each lane; the
+    values of predictors are not counted.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -255,8 +255,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        # Without tangent maps and gradients, this code has no kernels that read variations: derivatives along
-        # variations are difference quotients of sweeps.
+        # If the solver has no tangent maps and no gradients, its C has no kernels that read variations. Derivatives
+        # along variations are then computed as difference quotients of sweeps.
         if not (program.extras.tangent or step.adjoint):
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
@@ -416,19 +416,20 @@ def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel
     )
 
 
-def _block(program: Program, more: int = 0, once: int = 0) -> int:
+def _block(program: Program, per_stage: int = 0, shared: int = 0) -> int:
     """Return the number of bytes on the stack for a block of steps, which are solved together in SIMD lanes.
 
-    In each lane there are ``more`` additional values for each stage, and ``once`` additional values for all stages
-    together.
+    Each lane has additional values: ``per_stage`` values for each stage, and ``shared`` values for all stages together.
     """
     n = program.dimension
-    each = program.step.coefficients + 4 * n + 3 * n * n + more
-    return _DOUBLE * LANES * (len(program.fractions) * each + once)
+    each = program.step.coefficients + 4 * n + 3 * n * n + per_stage
+    return _DOUBLE * LANES * (len(program.fractions) * each + shared)
 
 
 def _group(program: Program) -> int:
-    """Return the number of values in each lane that a group of members needs, without additional values of paths."""
+    """Return the number of values that a group of members needs in each lane. Additional values for paths are not
+    counted.
+    """
     n = program.dimension
     return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
 
@@ -449,7 +450,7 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     return replace(kernel, name="evaluate", purpose=purpose, outputs=outputs, named=named)
 
 
-#: For the kinds of steps that may be computed in lanes: the function that returns the parts of a program in lanes.
+#: Kind of step → function that decides what a program with this kind of step computes in SIMD lanes.
 LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
     "newton": _of_newton,
     "explicit": _of_explicit,

@@ -22,9 +22,9 @@ SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions whose vector version, if there is one, is correct for all arguments. The vector versions of sin and cos are
-#: correct up to the argument 10⁸, since the reduction of larger arguments modulo π is not exact. The vector version of
-#: exp fails beyond 700, and that of log at 0, so exp and log are missing here.
+#: Functions whose vector version, if there is one, is called for arguments of any size. The vector versions of sin and
+#: cos return NaN beyond 10⁸, since the reduction of larger arguments modulo π is not exact. The list omits exp and log:
+#: the vector version of exp fails beyond 700, and that of log at 0.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
 #: Exponents of the powers that need no library function: squares, reciprocals and square roots.

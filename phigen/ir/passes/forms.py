@@ -22,7 +22,7 @@ NEAR, LANE, OWN = "_near", "_lane", "_own"
 
 #: Maps from elementary functions to their versions. SIMD is for loops over lanes, IN_LANES for loops over sites.
 #: IN_LANES omits functions with a removable singularity, since their versions are polynomials for small arguments.
-#: FULL_RANGE has the members of IN_LANES that are correct for all arguments.
+#: FULL_RANGE has the members of IN_LANES that are called for arguments of any size.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
