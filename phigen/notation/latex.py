@@ -1,4 +1,7 @@
-"""Formulas of a compilation as LaTeX for a paper: a fragment that needs amsmath."""
+"""Formulas of a compilation as LaTeX for a paper: a fragment that needs amsmath.
+
+Formulas are first written in MathML, which `phigen.notation.typesetting` converts to LaTeX.
+"""
 
 from __future__ import annotations
 
@@ -118,7 +121,7 @@ def _maps(compilation: CompiledSeries) -> Iterator[str]:
 
 
 def _gauged(compilation: CompiledSeries) -> str:
-    """Return the beginning ``H − λ C =`` of the formula of S_1 in MathML; "" if no Casimirs are subtracted from H."""
+    """Return ``H − λ C =`` in MathML, with which the formula of S_1 begins; "" if no Casimirs are subtracted from H."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
@@ -153,7 +156,7 @@ def _equations(
 
 
 def _pieces(formula: Formula) -> list[str]:
-    """Return a polynomial in MathML, in parts between which a line may break; a common divisor d becomes a factor 1/d.
+    """Return a polynomial in MathML, in parts between which a line may break. A divisor d becomes a factor 1/d.
 
     If not all terms are displayed, the last part says how many there are.
     """

@@ -383,9 +383,9 @@ def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
 def _pieces(terms: Sum) -> list[str]:
     """Return the terms of a sum as markup, each with its sign.
 
-    If the sum is a single term, but contains a long sum in parentheses, its parts are the terms in the parentheses.
-    Then the first part begins with the other factors and the opening parenthesis, and the last part ends with the
-    closing one.
+    If the sum is a single product, and one factor is a sum of more than three terms, the terms of this factor are
+    returned. The other factors and the opening parenthesis are put before the first term. The closing parenthesis is
+    put after the last term.
     """
     inner = next((f for f in terms[0].above if len(f.terms) > 3), None) if len(terms) == 1 else None
     if inner is None:

@@ -56,8 +56,8 @@ def _all_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
-    """Return each expression unchanged or multiplied out. If this leaves an expression long, its common subexpressions
-    get names.
+    """Return each expression unchanged or multiplied out, whichever is shorter. If the shorter form is long, the
+    unchanged expression is returned, with names for its common subexpressions.
     """
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}

@@ -1,8 +1,8 @@
-"""Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
+"""Conversion of formulas from MathML to LaTeX, with line breaks.
 
-Widths are upper estimates in em for the fonts of TeX. A line breaks before a plus or minus sign outside parentheses. If
-this would leave a large gap at the end of the line, the line breaks before a sign inside parentheses. If there is no
-sign, the line breaks between factors.
+The MathML is the markup of `phigen.notation.mathml`. Widths of formulas are upper estimates in em for the fonts of TeX.
+A line breaks before a plus or minus sign outside parentheses. If this would leave a large gap at the end of the line,
+the line breaks before a sign inside parentheses. If there is no sign, the line breaks between factors.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ INDENT, INDENTED = "\\quad ", 1.0
 #: The cost of ending a line at some place is the fraction of the line that stays empty, plus this number for each pair
 #: of parentheses around the place. The line ends where the cost is least.
 _SHORTER = 0.35
-#: A place between two factors has the cost of a place inside this number of additional pairs of parentheses.
+#: A line break between two factors costs as much as a break at a sign inside this number of additional pairs of
+#: parentheses.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
@@ -45,9 +46,10 @@ _TALL = ("mfrac", "msqrt", "mroot", "mtable")
 
 @dataclass(frozen=True)
 class Atom:
-    """Part of a formula that is not broken, in LaTeX, with its width in em.
+    """Part of a formula in LaTeX that is not broken, with its width in em.
 
-    ``level`` is the depth in parentheses at which a line may break before the part; None if it may not.
+    ``level`` determines the cost of a line break before the part: it is the number of pairs of parentheses around the
+    break, plus `_FACTORS` for a break between two factors. If ``level`` is None, no line may break there.
     """
 
     text: str
