@@ -288,10 +288,11 @@ def ends_statement(system: System, beta: Vector) -> Statement:
 
 
 def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: Vector, beta: Vector) -> Statement:
-    """Return the statement Ad*_g₁ β = Ad*_g₀ α: the attitude increment τ conserves momentum.
+    """Return the statement that the attitude increment τ conserves the momentum: Ad*_g₁ β = Ad*_g₀ α.
 
-    τ is the Cayley transform of the matrix P. The statement is decided on the elements (1 ± P/2) E_i (1 ∓ P/2), where
-    E_i are the matrices of the basis.
+    The attitude before the step is g₀. The attitude after the step is g₁ = g₀ τ or, if x is the momentum in space, g₁ =
+    τ g₀. τ is the Cayley transform of P, which is the matrix of the covector p. The statement is decided on the
+    elements (1 ± P/2) E_i (1 ∓ P/2), where E_i are the matrices of the basis.
     """
     p, n = covector_symbols(system.coordinates), range(algebra.dimension)
     sign = 1 if group.spatial else -1
@@ -412,12 +413,12 @@ def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], E
 
 
 def _any(s: Expression) -> Expression:
-    """Return a free symbol for φ(s), about which nothing is assumed."""
+    """Return a symbol in place of φ(s). A statement that is proved with this symbol holds for any function φ."""
     return symbol(Symbol("phi"))
 
 
 def _quarter(s: Expression) -> Expression:
-    """Return φ(s) = (1 − c)/s, where the free symbol c stands for 1 − sφ(s). In the proofs, s is |p|²/4."""
+    """Return (1 − c)/s in place of φ(s), where the symbol c stands for 1 − sφ(s). In the proofs, s is |p|²/4."""
     return (ONE - symbol(Symbol("cosine"))) / s
 
 

@@ -1,4 +1,4 @@
-"""All proofs about one spec, in groups, and the place in the spec of each refuted statement."""
+"""All proofs about one spec, in groups. Messages on refuted statements name the places in the spec."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from phigen.symbolic.verdict import REFUTED, Statement
 #: Names of the groups that are not examined if π is not a Poisson tensor. Their statements presuppose a Poisson tensor.
 UNEXAMINED = "Casimirs, invariants, the method"
 
-#: The key of a spec to which the statements of a group refer, by the name of the group.
+#: Group of statements → path of the key that the statements are about.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
 _PLACES |= {DAMPING: ("damping",), GAUSS: ("scheme",)}
 
@@ -94,7 +94,7 @@ def refutation(examination: Examination) -> str:
 def hint_of(spec: Spec, group: str) -> str:
     """Return a hint at the usual cause of a refuted statement of the ``group``; "" if phigen has no hint.
 
-    If a function is no Casimir, the coordinates may be in another order than the basis of the named algebra.
+    The usual cause of a refuted Casimir is that the coordinates are not in the order of the basis of the named algebra.
     """
     form = spec.poisson
     if group == DAMPING:
@@ -120,7 +120,7 @@ def doubts(examination: Examination) -> list[Diagnostic]:
 
 
 def unused_keys(examination: Examination) -> list[Diagnostic]:
-    """Return a warning for each key of the spec without effect, since an option replaced the scheme that it is for."""
+    """Return a warning for each key of the spec that has no effect with the scheme of the compilation."""
     compilation, spec = examination.compilation, examination.spec
     if compilation is None:
         return []

@@ -46,10 +46,10 @@ Pair = tuple[str, Any, Any]
 
 @dataclass(frozen=True)
 class Agreement:
-    """Result of comparing two derivations of S_``term`` or, if ``term`` is None, of ∇S_h, or of α and β.
+    """Result of comparing two derivations of the same formulas.
 
-    ``sympy`` and ``compiler`` are the seconds that the two derivations took for S_1 … S_``term``. ``compiler`` is None
-    if the time is not known.
+    The formulas are S_``term`` or, if ``term`` is None, either ∇S_h or the two maps α and β. ``sympy`` and ``compiler``
+    are the seconds that the two derivations took for S_1 … S_``term``. ``compiler`` is None if the time is not known.
     """
 
     statement: Statement
@@ -156,7 +156,9 @@ class _Derivation:
         return closed_form(self._maps(maps), self._dictionary.covector)
 
     def _maps(self, maps: Sequence[Expression]) -> list[Any]:
-        """Return the compiler's α or β as sympy expressions, with the function φ replaced by its Taylor polynomial."""
+        """Return the compiler's α or β as sympy expressions. The function φ of exponential bi-realisations is replaced
+        by its Taylor polynomial.
+        """
 
         def expanded(order: int, s: Any) -> Any:
             least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])

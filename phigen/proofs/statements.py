@@ -102,7 +102,9 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
-    """Return the statement that π is skew. If π is skew, the statement of the Jacobi identity follows."""
+    """Return two statements: that π is skew, and that π satisfies the Jacobi identity. If the first is refuted, the
+    second is left out.
+    """
     skew = checks.skew_symmetry(system)
     return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
 
