@@ -211,8 +211,10 @@ def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) ->
 
 
 def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
-    """Return the name of the bound of a parameter that a value violates: ``positive``, ``nonnegative``, or ""
-    for none.
+    """Return the name of the bound that ``value`` violates: ``positive``, ``nonnegative``, or "" if it violates
+    none.
+
+    ``name`` is the name of the parameter.
     """
     least = float(np.min(np.asarray(value), initial=np.inf))
     if name in interface.positive and not least > 0:

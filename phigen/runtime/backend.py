@@ -59,9 +59,10 @@ class Backend(Protocol):
         """Return the final states (members, DIM) of an ensemble or, with a stride, its frames (rows, members,
         DIM).
 
-        ``threads`` is the number of threads, None for one per core. ``attitudes`` (rows, members, numbers) contains the
-        initial attitudes in its first row, and receives the attitudes of the frames in the other rows. Without a
-        stride, ``attitudes`` has two rows; the second row receives the final attitudes.
+        ``threads`` is the number of threads, None for one per core. ``attitudes`` is an array (rows, members,
+        components); the components are those of an attitude and a position. The first row contains the initial
+        attitudes. The other rows receive the attitudes of the frames. Without a stride, ``attitudes`` has two rows; the
+        second row receives the final attitudes.
         """
         ...
 

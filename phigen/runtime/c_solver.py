@@ -216,8 +216,8 @@ class CSolver:
     ) -> None:
         """Integrate members that have attitudes. Their states and attitudes are updated in place.
 
-        ``initial`` are the states (DIM, members) and attitudes (numbers, members). ``rows`` are two arrays that receive
-        the states and the attitudes of the frames.
+        ``initial`` are two arrays: the states (DIM, members) and the attitudes (components, members). ``rows`` are two
+        arrays that receive the states and the attitudes of the frames.
         """
         packed, times_or_gauges, h = self._packed_arguments(members)
         start = [packed if members.parameters else None, *initial]

@@ -28,21 +28,24 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Default number of steps in a block. After each block, g is evaluated on the array of its states. Until then, a copy
-#: of the session is stored for each step.
+#: Default number of steps in a block. After each block, the function g, whose zeros are the crossings, is evaluated on
+#: the array of the states. Until then, a copy of the session is stored for each step.
 BLOCK = 64
-#: Number of intervals into which a step with a collocation polynomial is divided. g is evaluated at the ends of the
-#: intervals. Four intervals suffice to find the extrema of a motion that makes half a turn in a step.
+#: Number of intervals into which a step with a collocation polynomial is divided. The function g, whose zeros are the
+#: crossings, is evaluated at the ends of the intervals. Four intervals suffice to find the extrema of a motion that
+#: makes half a turn in a step.
 SAMPLES = 4
-#: g on a collocation polynomial is differentiated by a central difference. The two points of the difference lie at this
-#: distance before and after the zero, as a fraction of a step. This is about the cube root of the machine epsilon.
+#: The function g, whose zeros are the crossings, is differentiated along a collocation polynomial by a central
+#: difference. The two points of the difference lie at this distance before and after the zero, as a fraction of a step.
+#: This is about the cube root of the machine epsilon.
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
 #: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps. The first of these numbers with which no step
 #: fails is used: a single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Tolerance for the fraction θ of a step at which g vanishes. A smaller change of θ does not change the state.
+#: Tolerance for a zero, which is a fraction of a step. A change of the fraction below the tolerance does not change the
+#: state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
 #: Direction of a crossing → signs s for which s·g increases through zero as time increases.
@@ -152,8 +155,9 @@ class CrossingFinder(Generic[C]):
     def _interpolated_states(self, session: C) -> Floats:
         """Return states (points, DIM) inside the last step, from the collocation polynomial of the method.
 
-        The array is empty if the method has no collocation polynomial. It is also empty if the function g needs times
-        and a monitor rescales the time, since the times inside a step are then unknown.
+        The array is empty if the method has no collocation polynomial. The array is also empty if a monitor rescales
+        the time and the function whose zeros are the crossings depends on the time: the times inside a step are then
+        unknown.
         """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
@@ -266,9 +270,10 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _value_at(self, j: int, fraction: float) -> float:
-        """Return the value of g at a fraction of interval j, which lies between points j and j + 1.
+        """Return the value of the function g, whose zeros are the crossings, at a fraction of interval j.
 
-        The state is computed from the collocation polynomial or, if the method has none, by a step.
+        Interval j lies between points j and j + 1. The state is computed from the collocation polynomial or, if the
+        method has none, by a step.
         """
         step, part = divmod(j, self.points)
         if self.points > 1:
@@ -276,7 +281,10 @@ class CrossingFinder(Generic[C]):
         return self._sign * self._value(self._session_at_fraction(step, fraction, SUBSTEPS), j, fraction)
 
     def _on_polynomial(self, step: int, fractions: Sequence[float]) -> list[float]:
-        """Return the values of g at fractions of a step, on the collocation polynomial of this step."""
+        """Return the values of the function g, whose zeros are the crossings, at fractions of a step.
+
+        The states are those of the collocation polynomial of this step.
+        """
         states = self._session_after(step).interpolated(fractions)
         times = self._time(self.points * (step + np.array(fractions)))
         return [self._sign * float(value) for value in self._values(states, times)]
@@ -320,7 +328,8 @@ class CrossingFinder(Generic[C]):
             return self._sign * self._value(moved_session, self.points * step, self.points * fraction)
 
         for count in SUBSTEPS:
-            # All fractions are reached by the same number of substeps, so that g is a smooth function of the fraction.
+            # The state at each fraction is reached by the same number of substeps, so that ``value`` is a smooth
+            # function of the fraction.
             try:
                 fraction = root(value, low, at_low, high, at_high)
                 crossing_session = self._session_at_fraction(step, fraction, (count,))

@@ -82,9 +82,8 @@ class LatticeInterface(Interface):
 
     ``coordinates`` are the coordinates of one site. Parameters in ``at_sites`` have a value at each site, parameters in
     ``at_bonds`` a value at each bond of a graph. ``casimir_kinds`` has one entry per Casimir: ``sites`` for a Casimir
-    with a value at each site, and ``sum`` or ``product`` for the sum or the product of densities over all sites.
-    ``periods`` and ``least`` have one number per axis. The number of sites along an axis must be a multiple of its
-    period, and at least the number in ``least``.
+    with a value at each site, and ``sum`` or ``product`` for the sum or the product of densities over all sites. The
+    number of sites along axis k is a multiple of ``periods[k]``, and at least ``least[k]``.
     """
 
     axes: tuple[str, ...] = ()

@@ -349,10 +349,10 @@ class LatticeTrajectory:
     def correlation(
         self, of: str, other: str | None = None, *, axis: str | None = None, up_to: int, after: float | None = None
     ) -> Floats:
-        """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites, where f and g are the coordinates ``of`` and
-        ``other``.
+        """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites, where f and g are coordinates.
 
-        By default g is f, and d is along the first axis. ``after`` and the errors are documented in
+        The argument ``of`` is the name of f. The argument ``other`` is the name of g, by default that of f. The
+        distance d is along ``axis``, by default the first axis. ``after`` and the errors are documented in
         `spectra.correlation`.
         """
         return spectra.correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
@@ -490,13 +490,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return IntegrationPlan(beginning, strided(beginning.h, end.steps, stride, end), beginning.t0, retry)
 
     def carried_out(
-        self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
+        self, plan: IntegrationPlan, names: Sequence[str] = (), **options: Any
     ) -> LatticeTrajectory | LatticeSeries:
-        """Integrate as planned: record the numbers that ``of`` names or, if ``of`` is empty, the states.
+        """Integrate as planned. Record the quantities ``names`` or, if there are no names, the states.
 
-        ``where`` are the arguments about files and progress, which `numbered` and `framed` take.
+        ``options`` are the arguments of `numbered` and `framed` about files and progress.
         """
-        return self.numbered(plan, of, **where) if of else self.framed(plan, **where)
+        return self.numbered(plan, names, **options) if names else self.framed(plan, **options)
 
     def framed(
         self,
@@ -591,9 +591,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
         parameters at sites and bonds are computed from the formulas, files and random numbers of the run, for its
-        ``sizes`` or for the argument ``sizes``. Further arguments replace settings of the spec: the ``step``; the
-        number of ``steps``, or the time ``until`` at which the run ends; the ``stride``, the time ``every`` between
-        rows, or the times ``at`` of the rows; and the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the
+        ``sizes`` or for the argument ``sizes``. The arguments ``step``, ``steps``, ``until``, ``stride``, ``every``,
+        ``at`` and ``seed`` replace the settings of the spec that have these names. ``x0`` (coordinates, *sizes) is the
         initial state; ``retry`` is explained at `integrate`. A run with ``stop`` ends where the expression ``stop``
         first passes through 0. ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if
         there is no run of that name, and `SpecError` for an initial state that does not fit the sizes.
@@ -697,21 +696,22 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def numbered(
         self,
         plan: IntegrationPlan,
-        of: Sequence[str],
+        names: Sequence[str],
         *,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
         resume: bool = True,
         progress: Progress | None = None,
     ) -> LatticeSeries:
-        """Integrate as planned, and record the numbers that ``of`` names. Names, files and errors are those of
-        `series`."""
+        """Integrate as planned, and record the quantities ``names``. Possible names, files and errors are those of
+        `series`.
+        """
         recordable_names = recordable(self.interface)
-        if strange := [name for name in of if name not in recordable_names]:
+        if strange := [name for name in names if name not in recordable_names]:
             raise ValueError(f"{strange[0]!r} cannot be recorded; there are {', '.join(recordable_names)}")
         target = expect_table(output) if output else None
-        rows, met = NumberRows(self.interface, of), NumberRows(self.interface, of)
-        identity = {"record": list(of)}
+        rows, met = NumberRows(self.interface, names), NumberRows(self.interface, names)
+        identity = {"record": list(names)}
         run = LatticeRun(self, plan, rows, met, Path(checkpoints) if checkpoints else None, identity)
         self._expect_place(run, target, None, resume=resume)
 

@@ -24,9 +24,9 @@ class RowSteps:
     """Positions of the rows of a run. Row k is reached by ``whole[k]`` whole steps and a shorter step.
 
     ``part[k]`` is the size of the shorter step, or 0 if row k is at the end of a whole step. The first row is the
-    start. If ``end`` is not None, the last row is at this end of the run. With a monitor and rows at given times,
-    ``spans`` (rows,) are the times from the start to the rows; the number of steps before each row is then counted
-    during the run.
+    start. The last row is the end of the run, which ``end`` describes. If ``end`` is None, the run ends after a whole
+    number of steps. With a monitor and rows at given times, ``spans`` (rows,) are the times from the start to the rows;
+    the number of steps before each row is then counted during the run.
     """
 
     whole: NDArray[np.int64]

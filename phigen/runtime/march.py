@@ -15,8 +15,8 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: A piece ends after about _SECONDS, so that the user sees progress. It ends earlier if it has _MOST_STEPS steps or
-#: _MOST_ROWS rows.
+#: The rows of a run are yielded in pieces. A piece ends after about _SECONDS seconds, so that the user sees progress. A
+#: piece ends earlier if it has _MOST_STEPS steps or _MOST_ROWS rows.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 

@@ -32,10 +32,10 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Flo
     for row, steps in enumerate(np.diff(marks), 1):
         batch.advance(int(steps))
         if frames is not None:
-            frames[row, batch.who] = batch.x
+            frames[row, batch.numbers] = batch.x
         if attitudes is not None:
             attitudes[row] = np.nan
-            attitudes[row, batch.who] = batch.turned[batch.who]
+            attitudes[row, batch.numbers] = batch.turned[batch.numbers]
     if attitudes is not None and frames is None:
         attitudes[-1] = batch.turned
     return members.checked(batch.final if frames is None else frames, batch.failures, batch.failed_at)
@@ -57,16 +57,16 @@ def _refused(module: Any, members: Members) -> list[int]:
 class MemberBatch:
     """The members that have not failed, and the variables of the loop over steps.
 
-    ``who`` are the numbers of these members and ``x`` their states. ``final`` and ``turned`` have the last state and
-    the last attitude of all members, including failed members. ``failures`` maps failed members to their status.
-    ``failed_at`` is the number of steps before the first failure. ``first`` has the initial attitude of each member;
-    it is None if the spec has no attitude.
+    ``numbers`` (members,) are the numbers of these members, and ``x`` their states. ``final`` and ``turned`` have the
+    last state and the last attitude of all members, including failed members. ``failures`` maps failed members to their
+    status. ``failed_at`` is the number of steps before the first failure. ``first`` has the initial attitude of each
+    member; it is None if the spec has no attitude.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
         self._module, self._members, self._done = module, members, 0
         self.failures, self.failed_at, self.final = dict[int, str](), -1, members.x0.copy()
-        self.who, self.x, self._carry = np.arange(len(members)), members.x0, np.zeros_like(members.x0)
+        self.numbers, self.x, self._carry = np.arange(len(members)), members.x0, np.zeros_like(members.x0)
         values = module._values(dict(members.parameters))
         with np.errstate(all="ignore"):
             self._stages = module._coefficients(values, self.x, members.h[()], gauge)
@@ -87,7 +87,7 @@ class MemberBatch:
         """
         with np.errstate(all="ignore"):
             self._begin_run(steps)
-            while steps and len(self.who):
+            while steps and len(self.numbers):
                 failed = self._step()
                 if failed:
                     self._leave(failed)
@@ -98,7 +98,7 @@ class MemberBatch:
 
     def _begin_run(self, steps: int) -> None:
         """Apply the inverse corrector before a sequence of steps, if the method has a corrector."""
-        if hasattr(self._module, "_followed") and steps and len(self.who):
+        if hasattr(self._module, "_followed") and steps and len(self.numbers):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
             self._running = True
@@ -129,15 +129,15 @@ class MemberBatch:
     def _report(self) -> None:
         """Copy states and attitudes of the remaining members to ``final`` and ``turned``."""
         x, _ = self._state()
-        self.final[self.who] = np.where(np.isfinite(x), x, self._before) if self._running else x
+        self.final[self.numbers] = np.where(np.isfinite(x), x, self._before) if self._running else x
         if self._first is not None:
             elapsed = self._done * self._h
             elapsed = elapsed[:, np.newaxis] if np.ndim(elapsed) else elapsed
-            self.turned[self.who] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
+            self.turned[self.numbers] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
 
     def _select_settings(self) -> None:
         """Store the step sizes, initial times and random numbers of the remaining members."""
-        left, draws = self._members.part(self.who), self._members.draws
+        left, draws = self._members.part(self.numbers), self._members.draws
         self._h, self._t0 = left.h[()], left.t0[()]
         if hasattr(self._module, "_drawing"):
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
@@ -152,7 +152,7 @@ class MemberBatch:
     def _step(self) -> dict[int, str]:
         """Make one step of all remaining members. If some members fail, no member is advanced.
 
-        Returns the status of each failed member, by its index in ``who``.
+        Returns the status of each failed member. The keys are the indices of failed members in the array ``numbers``.
         """
         module, memory = self._module, list(self._memory)
         x, carry, attitudes = self.x, self._carry, self._turned
@@ -177,11 +177,11 @@ class MemberBatch:
         """Remove failed members. The predictors of the remaining members are not changed, so the bits of their states
         do not depend on this removal.
         """
-        remaining = np.delete(np.arange(len(self.who)), list(failed))
+        remaining = np.delete(np.arange(len(self.numbers)), list(failed))
         self._report()
-        self.failures |= {int(self.who[m]): status for m, status in failed.items()}
+        self.failures |= {int(self.numbers[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
-        self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
+        self.numbers, self.x, self._carry = self.numbers[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
         # Predictors are arrays (members, DIM) or, in Gauss methods, (unknowns, members, stages). So the axis of members
         # is the last axis but one. An array with one axis has only the axis of members.

@@ -152,8 +152,9 @@ class Propagation:
         }
 
     def _members(self, x0: ArrayLike, parameters: Values) -> tuple[tuple[int, ...], Floats, dict[str, Floats]]:
-        """Return the shape of x0, the initial states as an array (members, DIM), and the parameters as arrays (members,
-        …)."""
+        """Return three results: the shape of ``x0``, then ``x0`` as an array (members, …), and the parameters as arrays
+        (members, …).
+        """
         x, values = np.asarray(x0, dtype=np.float64), dict[str, Any](self.shared)
         for name, value in parameters.items():
             array = np.asarray(value, dtype=np.float64)

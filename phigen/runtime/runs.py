@@ -158,11 +158,13 @@ def spans_of_run(run: Run, span: float) -> list[float]:
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield a session at each row of a run, with its number of steps. The first row is the start.
+    """Yield pairs, one for each row of a run: a session at the row, and the number of steps from the start to
+    the row.
 
-    Rows are at the times that ``run.every`` or ``run.at`` gives; without these keys they are at every ``run.stride``-th
-    step. The last row is the end. If the end lies inside a step, its number of steps has a fraction. The caller must
-    read a session before it asks for the next one. Raises `BackendError`.
+    The first row is the start. Rows are at the times that ``run.every`` or ``run.at`` gives; without these keys they
+    are at every ``run.stride``-th step. The last row is the end. If the end lies inside a step, the number of steps to
+    the last row is not an integer. The caller must read a session before it asks for the next one. Raises
+    `BackendError`.
     """
     yield session, 0.0
     yield from _timed_rows(session, run, end) if run.is_timed else _strided_rows(session, run, end)
@@ -171,17 +173,18 @@ def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, flo
 
 
 def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield the session at every stride-th step before the end, with its number of steps."""
+    """Yield pairs: the session at every ``run.stride``-th step before the end, and the number of this step."""
     for mark in range(run.stride, end.steps + end.part, run.stride):
         session.advance(float(run.step), mark - session.steps)
         yield session, float(mark)
 
 
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield a session at each row before the end, with its number of steps, for rows at given times.
+    """Yield pairs for rows at given times before the end: a session at the row, and the number of steps to the
+    row.
 
     The times are the multiples of ``run.every``, or the times ``run.at``. A time between two steps is reached by a
-    shorter step from the last whole step before it; the number of steps then has a fraction.
+    shorter step from the last whole step before the time; the number of steps then has a fraction.
     """
     h = float(run.step)
     for span in spans_of_run(run, end.span):

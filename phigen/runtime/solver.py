@@ -104,9 +104,9 @@ class Solver(Named[Backend, Interface]):
         A negative ``h`` integrates backwards in time; with a monitor (rescaled time: dt = g dτ), ``h`` is a step in τ.
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of
         ``steps``, the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry
-        smaller steps. Their composition is a Poisson map that keeps the Casimirs, but not the map of the whole step.
-        ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by default the identity
-        and the origin.
+        smaller steps. The composition of the smaller steps is a Poisson map and keeps the Casimirs; it differs from the
+        map of the whole step. ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by
+        default the identity and the origin.
 
         With noise, the random numbers are a function of ``seed``, ``member`` and the number of the step, where
         ``step0`` is the number of the first step; all three are 0 by default. Instead, increments of the noise can be
@@ -200,7 +200,7 @@ class Solver(Named[Backend, Interface]):
     def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
         """Return the trajectory of a run that ends at a zero of a function, or that has rows at given times.
 
-        `integrate` has no arguments for such ends or rows.
+        `run` calls `integrate` for all other runs.
         """
         names = self.interface
         stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None

@@ -52,7 +52,8 @@ class DynamicSpectrum:
     def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
         """Return the arrays of the spectrum as a dict: name → (names of dimensions, values).
 
-        S has the given ``name``; the wave numbers ``q_AXIS`` and the frequencies ``omega`` have the ``prefix``.
+        The array of S(q, ω) has the name ``name``. The arrays of wave numbers and frequencies have the names ``q_AXIS``
+        and ``omega``, with the ``prefix`` before each name.
         """
         names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
         coordinates = zip(names, [*self.q, self.omega], strict=True)

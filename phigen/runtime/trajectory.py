@@ -167,7 +167,7 @@ class Turned(NamedTuple):
 
 
 def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
-    """Split arrays ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3).
+    """Split arrays ``elements`` (…, components) into attitudes (…, *shape) and positions (…, 3).
 
     An attitude or a position that the system does not have is returned as None.
     """

@@ -216,7 +216,7 @@ class DeviceSolver:
         return bool(same and not has_chosen_gauge and self.interface.ensemble.coefficients)
 
     def _coefficients(self, members: Members) -> Any:
-        """Compute the coefficients that all members share, and return them as an argument of their kernel."""
+        """Compute the coefficients that all members share, and return the kernel argument that contains them."""
         coefficients = np.empty(self.interface.ensemble.coefficients, self._real)
         buffer = self.device.empty(coefficients.nbytes)
         parameters, h = (self._shared_or_each(v)[0] for v in (self._parameters(members), np.atleast_1d(members.h)))

@@ -161,7 +161,11 @@ class DeviceLatticeSession(NumpyLatticeSession):
     # --- functions of the state
 
     def _evaluated(self, name: str) -> tuple[Any, int]:
-        """Evaluate a kernel at all sites, and return a buffer with its outputs and the number of outputs per site."""
+        """Evaluate a kernel at all sites. Return two values: a buffer with the outputs, and the number of outputs per
+        site.
+
+        The result is (None, 0) if there is no kernel with this name.
+        """
         launch = self._interface.launches.others.get(name)
         if launch is None:
             return None, 0

@@ -46,7 +46,9 @@ class Kernels:
 
 
 class Launcher:
-    """Launches the kernels of one lattice. Arrays have the precision of ``tables``, the tables of its sites."""
+    """Launches the kernels of one lattice. ``tables`` are the tables of the sites. All arrays have the precision of the
+    tables.
+    """
 
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
