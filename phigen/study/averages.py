@@ -158,7 +158,7 @@ def averages(
 
     Rows from the time ``after`` on are averaged. Standard errors come from at least ``blocks`` blocks. ``phigen run``
     and sweeps take ``after`` and ``blocks`` from the setting ``average:`` of a run. A trajectory does not contain this
-    setting. To obtain the numbers that ``phigen run`` prints, pass the values in the setting. Observables of lattices
+    setting, so both values must be passed to obtain the numbers that ``phigen run`` prints. Observables of lattices
     with a value at each site are left out.
     """
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables

@@ -124,10 +124,10 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 
 
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
-    """Return the powers of the step size with which the changes of H̃ with 0, 1, … corrections decrease.
+    """Return the observed powers of the step size for H̃ with 0, 1, … corrections.
 
-    The step ``h`` of the run is doubled until the changes exceed rounding errors. If the changes are rounding errors at
-    all step sizes, the power is infinite.
+    A power q says that the change of H̃ along a run is proportional to h^q. The step ``h`` of the run is doubled until
+    the changes exceed rounding errors. If the changes are rounding errors at all step sizes, the power is infinite.
     """
     observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):

@@ -14,15 +14,16 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ONE, Expression, gradient, total
 
-#: Weights of P and of its first three derivatives at the ends of an interval of length 1. FINE: the rule of order 8.
-#: COARSE: the rule of order 6. At the second end, weights of odd derivatives have the opposite sign.
+#: Weights for the integral of the power P over an interval of length 1, from P and its first three derivatives at both
+#: ends. FINE: the rule of order 8. COARSE: the rule of order 6. At the second end, weights of odd derivatives have the
+#: opposite sign.
 FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
 def powers(system: System) -> list[Expression]:
     """Return the power P = dH/dt and its first three time derivatives along the motion, as expressions.
 
-    The list is empty if H is constant along the motion, or if noise changes H as well.
+    The list is empty if H is constant along the motion, or if the system has noise.
     """
     if not system.driven or system.noise:
         return []

@@ -19,20 +19,21 @@ from phigen.symbolic.arrays import Floats
 #: Number of steps and stride of the runs. Rows are after 4, 8 and 11 steps: the reverse pass works in blocks of eight
 #: steps, so that one row lies inside a block, one at its end, and one after a shorter last stride.
 STEPS, STRIDE = 11, 4
-#: The step of a run is halved at most this number of times while the run fails. Runs start from few sites of a lattice,
-#: or at the end of the user's run. From these states the user's step size may be too large.
+#: The step of a run is halved at most this number of times while the run fails. Some runs start on a lattice with few
+#: sites, or at the end of the user's run. For these runs, the user's step size may be too large.
 HALVINGS = 6
 #: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to the terms
 #: of the product. Gradient and product are exact up to rounding.
 TRANSPOSED = 1e-12
-#: Largest accepted difference between a gradient and finite differences of order 6. The errors of the finite
-#: differences are part of it. Below: the two displacements of the differences, in units of the displaced quantity.
+#: DIFFERENCES: largest accepted deviation of a gradient from finite differences of order 6; errors of the finite
+#: differences contribute to the deviation. _DISTANCES: the two displacements in the finite differences, in units of the
+#: displaced quantity.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
 _FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5), (6, -1 / 6))
-#: The error of a derivative is relative to the derivative, or to this fraction of the function value if that is larger,
-#: because finite differences cannot resolve smaller derivatives.
+#: The error of a derivative is relative to the larger of two numbers: the derivative, and this fraction of the function
+#: value. Finite differences cannot resolve smaller derivatives.
 _LEAST = 1e-3
 #: _DIRECTIONS: number of random directions in which the initial state is displaced. _MOST_COLUMNS: for states with at
 #: most this number of coordinates, the tangent vectors are all unit vectors; for longer states they are random.

@@ -1,7 +1,8 @@
 """Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
-The identity DΦ π DΦᵀ = π∘Φ of Poisson maps is measured on a lattice of a few sites. Their initial states are taken from
-sites of the run. The identity is proved for all sizes; the measurement detects errors of the generated code.
+The identity DΦ π DΦᵀ = π∘Φ of Poisson maps is measured on a lattice of a few sites. The initial values on this lattice
+are values at sites of the run. The identity is proved for all sizes; the measurement detects errors of the generated
+code.
 """
 
 from __future__ import annotations
@@ -346,14 +347,14 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
     # from the tangent map counts, since larger deviations are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
-    trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
-    slip = min(max(small_lattice.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in trials)
+    trials = [(units, spacing) for units in (fields, site_units) for spacing in (3e-3, 3e-4)]
+    slip = min(max(small_lattice.slip(s, *trial) for s in subject.solvers.values()) for trial in trials)
     name, limit = f"tangent map against differences {sizes_text}", f"≤ {DIFFERENCES:.0e}"
     yield Check(name, slip, limit, slip <= DIFFERENCES, f"differs from finite differences of the step by {slip:.1e}")
 
 
 def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the checks of gradients of all targets on a lattice of a few sites.
+    """Yield the checks of gradients on a lattice of a few sites. Every target computes the gradients.
 
     If the lattice of the run is small enough, gradients of the first target are also checked on that lattice.
     """
@@ -437,11 +438,11 @@ class _SmallLattice:
         size = float((np.abs(slopes) @ np.abs(start_tensor) @ np.abs(slopes).T).max()) or 1.0
         return float(np.abs(slopes @ start_tensor @ slopes.T - image).max()) / size
 
-    def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
+    def slip(self, solver: LatticeSolver, units: Floats, spacing: float) -> float:
         """Return the largest difference between the tangent map of a step and finite differences of order 6.
 
         The difference is relative to the largest entry of the tangent map. ``units`` has a unit for each number of a
-        state. In the finite differences, each number is displaced by ``apart`` times its unit.
+        state. In the finite differences, each number is displaced by multiples of ``spacing`` times its unit.
         """
 
         def step(y: Floats) -> Floats:
@@ -449,7 +450,7 @@ class _SmallLattice:
             return np.asarray(stepped_state.reshape(-1) / units)
 
         slopes = self.tangent(solver, self.subject.h)[1] * units / units[:, None]
-        differences = _slopes(step, self.x.reshape(-1) / units, apart)
+        differences = _slopes(step, self.x.reshape(-1) / units, spacing)
         return float(np.abs(slopes - differences).max() / np.abs(slopes).max())
 
 
@@ -476,19 +477,19 @@ def _units(sizes: Floats) -> Floats:
     return np.where(sizes > 0, sizes, 1.0)
 
 
-def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:
+def _slopes(function: Callable[[Floats], Floats], y: Floats, spacing: float) -> Floats:
     """Return the derivative of a function at ``y`` as a matrix, by central differences of order 6.
 
-    The spacing of the differences is ``apart``.
+    The differences use points at distances of ``spacing``.
     """
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     columns = []
     for k in range(len(y)):
-        displacement = apart * np.eye(len(y))[k]
+        displacement = spacing * np.eye(len(y))[k]
         columns.append(
             sum(w * (function(y + m * displacement) - function(y - m * displacement)) for m, w in weights.items())
         )
-    return np.array(columns).T / apart
+    return np.array(columns).T / spacing
 
 
 def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:

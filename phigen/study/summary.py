@@ -44,12 +44,13 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method in a run with ``rows`` rows. Only the first ``good`` rows are evaluated: they are finite.
+    """Errors of one method in a run with ``rows`` rows. Only the first ``good`` rows are evaluated: they are
+    finite.
 
     ``exact`` is the largest error against the closed form, None if the run states no closed form. If the method fails
     in its first step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H −
-    work, and ``change`` is the largest change of H. Then ``work`` is the work at the end, with an error of about
-    ``off`` in the unit of the energy.
+    work, and ``change`` is the largest change of H. Then the field ``work`` has the work at the end of the run, and the
+    field ``off`` the estimated error of this work, in the unit of the energy.
     """
 
     method: str
@@ -90,8 +91,8 @@ def summarise(
 class Watch:
     """Running summary of the states of one method. Its memory does not grow with the number of states.
 
-    ``rows`` is the number of rows that the run will have; it determines the windows. ``state`` has all intermediate
-    results, as arrays that can be saved.
+    The run will have ``rows`` rows. The rows are divided into `WINDOWS` parts of equal length, whose largest errors are
+    compared. ``state`` has all intermediate results, as arrays that can be saved.
     """
 
     def __init__(
@@ -178,7 +179,8 @@ class Watch:
         state["final"] = x[-1].copy()
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
-        """Return the work done from the start to each of the times ``t``, and add it to the state.
+        """Return the work done from the start to each of the times ``t``. The work up to the last of the times is
+        stored for the next call.
 
         ``slopes`` are the power and its derivatives at these times. The times are later than those of earlier calls.
         """

@@ -39,8 +39,8 @@ MODIFIED_SLACK = 0.6
 #: Largest accepted error in three checks of single steps: of the identity DΦ π DΦᵀ = π∘Φ, of reversibility, and of the
 #: agreement of targets. Errors are relative to the size of the compared values.
 ONE_STEP = 1e-13
-#: Largest accepted difference between the tangent map and finite differences of a step. The errors of the finite
-#: differences are part of it.
+#: Largest accepted deviation of the tangent map from finite differences of a step; errors of the finite differences
+#: contribute to the deviation.
 DIFFERENCES = 1e-7
 #: Largest accepted ratio of the largest energy error in the last tenth of a run to that in the first tenth.
 GROWTH = 4.0
@@ -75,8 +75,9 @@ class Check:
 class Verification:
     """Results of all checks of one spec on one run.
 
-    ``label`` describes the method with its order. ``units`` are the units of errors by quantity; for lattices, the text
-    ``said`` states them. ``clock`` is the variable in which steps have equal size, t or τ.
+    ``label`` describes the method with its order. ``units`` maps quantities to the units of their errors. For lattices,
+    ``units`` is empty, and the units are stated in the text ``said``. ``clock`` is the variable in which steps have
+    equal size, t or τ.
     """
 
     name: str
@@ -291,7 +292,8 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
-    """Return a function of a time that returns the solution at this time, and its estimated relative error.
+    """Return a function that maps a time to a pair: the solution at this time, and the estimated relative error of the
+    solution.
 
     The solution is computed by DOP853, with steps that are halved until two results agree.
     """
