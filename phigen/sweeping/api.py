@@ -208,7 +208,8 @@ def _sweep_of(
 
 
 def _plain_entries(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """Return the entries ``random``, ``seed`` and ``file`` of ``over``, which are settings, not ranges of quantities.
+    """Return those entries of ``over`` that are settings: ``random``, ``seed`` and ``file``. Other entries are ranges
+    of quantities.
 
     If the spec has a parameter with one of these names, the entry is the range of the parameter, and is left out here.
     """

@@ -38,7 +38,7 @@ _ENTRIES = {
 #: Entries of a plan that determine only the statistics of observables over a run, with their names in messages.
 _AVERAGED = {"after": "average: after:", "blocks": "average: blocks:", "stride": "stride:"}
 
-#: Entries of ``about`` of a plan that determine the results, with their names in messages.
+#: Facts that determine the results of a sweep: key in the result of `_facts` → name in messages.
 _FACTS = {"target": "target", "phigen": "version of phigen", "folder": "folder of the spec", "contents": "data files"}
 
 #: Largest number of characters of a value that is quoted in a message.
@@ -87,7 +87,11 @@ def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
 
 
 def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[str]:
-    """Return a phrase if the code of the solver differs, without headers of files and the digest of the spec."""
+    """Return a list with a phrase for a message if the solver differs from that of the stored sweep, otherwise
+    [].
+
+    The headers of files and the digest of the spec are not compared.
+    """
     stored = store.solver_data(job.interface, job.files, job.functions, job.spec)
     stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, solver))
     same = stored["interface"] == solver["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
@@ -95,7 +99,7 @@ def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[st
 
 
 def _body(text: str) -> str:
-    """Return the text of a generated file without its header, and without the digest of the spec in it."""
+    """Return the text of a generated file for a comparison: without the header and the digest of the spec."""
     return re.sub(r'(SPEC_SHA256\W+)"[0-9a-f]{64}"', r"\1", header.split(text)[1])
 
 
