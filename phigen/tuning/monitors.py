@@ -52,13 +52,12 @@ MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
 MOST_LETTERS = 160
-#: HIGHEST: largest order at which monitors are compared. FEWEST: if the run without a monitor needs fewer steps than
-#: this, runs with a monitor may still have MOST · FEWEST steps. SECONDS: largest duration of a run in seconds.
+#: HIGHEST: largest order at which monitors are compared. SECONDS: largest duration of a run in seconds. A run with a
+#: monitor may have MOST · n steps, where n is the number of steps without a monitor, or FEWEST if that is larger.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25
-#: HALVINGS: largest number of halvings of a step. MOST: largest number of steps of a run with a monitor, divided by the
-#: number of steps of the run without one.
+#: HALVINGS: largest number of halvings of a step. MOST: factor in the limit for the steps of a run with a monitor.
 HALVINGS, MOST = 30, 64
 
 

@@ -69,7 +69,7 @@ class Problem(ABC):
         """Whether monitors may be tried. They even out the speed of the motion."""
 
     def method(self, solver: Backend) -> Candidate:
-        """Return the method of a solver, which makes runs from the initial state of this problem."""
+        """Return an object that makes runs with ``solver``, from the initial state of this problem."""
         return Candidate(solver, self)
 
     @abstractmethod
@@ -162,7 +162,9 @@ class SystemProblem(Problem):
 
 
 def rounding_of(compilation: Compilation) -> float:
-    """Return the relative rounding error of one step of the solvers that are measured. NumPy has double precision."""
+    """Return the relative rounding error of one step in the number type of the measured solvers. Solvers in NumPy
+    always have double precision.
+    """
     return SINGLE_ROUNDING if compilation.program.single and chosen_target("auto") == "c" else ROUNDING
 
 
@@ -180,7 +182,8 @@ class CompiledMethod(Protocol):
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function of a number n that makes n further steps of size ``h``, for timing.
+        """Return a function for timing, with a number of steps as argument. The function makes this number of further
+        steps of size ``h``.
 
         The first call starts from the initial state.
         """
@@ -196,7 +199,7 @@ class Candidate:
 
     @property
     def rounding(self) -> float:
-        """The relative rounding error of one step, of the number type of the solver."""
+        """The relative rounding error of one step, in the number type of the solver."""
         return self.problem.rounding
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:

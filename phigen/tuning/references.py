@@ -94,8 +94,8 @@ def orbit_error(
     reference solution is computed by ``reference_method``, with steps of at most ``step``. The result is None if the
     reference solution does not become accurate enough within ``seconds``.
     """
-    count, until = len(states) - 1, time.perf_counter() + seconds
-    orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)
+    count, deadline = len(states) - 1, time.perf_counter() + seconds
+    orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, deadline)
     if orbit is None:
         return None
     error = distance(states, orbit[0])
@@ -108,12 +108,13 @@ def distance(states: Floats, reference_states: Floats) -> float:
 
 
 def _converged(
-    method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, until: float
+    method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, deadline: float
 ) -> tuple[Floats, float, float] | None:
-    """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the states.
+    """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the
+    states.
 
-    The step is halved until the states change little, or change more than at the previous halving, or the time
-    ``until`` is reached. The result is None if steps of all sizes fail.
+    The step is halved until the change is small, or larger than at the previous halving, or until `time.perf_counter`
+    exceeds ``deadline``. The result is None if steps of all sizes fail.
     """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None
@@ -128,6 +129,6 @@ def _converged(
             if change > previous and best is not None:
                 break
         best, last = (states, spacing / stride, change), states
-        if change <= CONVERGED * accuracy or time.perf_counter() > until:
+        if change <= CONVERGED * accuracy or time.perf_counter() > deadline:
             break
     return best

@@ -16,7 +16,8 @@ FINER, MOST_POINTS = math.sqrt(2.0), 48
 FAILURES = 16
 #: A scan continues until the error is below this fraction of the accuracy, so that figures show the curve beyond it.
 BEYOND = 1 / 30
-#: Steps are chosen for this fraction of the accuracy, since the error of a longer run is slightly larger.
+#: Step sizes are chosen so that the error is at most this fraction of the largest accepted error. This leaves a margin,
+#: since the error of a longer run is slightly larger.
 AIM = 0.8
 #: The search for a cheaper step continues with smaller steps, which may need fewer iterations. The search ends when the
 #: cost exceeds the least cost by this factor.
@@ -291,10 +292,11 @@ def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting],
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
-    """Return the setting with the next higher order, or the one with the next lower order.
+    """Return a list with the setting whose order should be tried next; [] if there is none.
 
-    The lower order is taken if there is no higher one, or if the higher one was tried or refused. If the lower one was
-    tried or refused too, the list is empty. ``orders`` has the costs of the orders that were tried.
+    The setting has the next higher order. If there is no higher order, or if it was tried or refused, the setting has
+    the next lower order. If the lower order was tried or refused too, the list is empty. ``orders`` has the costs of
+    the orders that were tried.
     """
     higher_orders = [k for k in best.orders if k > best.order]
     lower_orders = [k for k in best.orders if k < best.order]

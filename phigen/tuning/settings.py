@@ -54,9 +54,9 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 class Setting:
     """A choice of method: bi-realisation or other scheme, order, gauge and composition.
 
-    ``kind`` is the kind of bi-realisation, or `SPLITTING`, `GAUSS` or `AUTO` for other schemes. For the kinds
-    ``product`` and ``pullback``, ``of`` is the kind of the bi-realisations of which they are made. If ``kind`` or
-    ``gauge`` is `OWN`, the choice of the spec remains. If ``monitor`` is empty, the monitor of the spec remains.
+    ``kind`` is the kind of bi-realisation, or `SPLITTING`, `GAUSS` or `AUTO` for other schemes. A bi-realisation of the
+    kind ``product`` or ``pullback`` is made from other bi-realisations, whose kind is in the field ``of``. If ``kind``
+    or ``gauge`` is `OWN`, the choice of the spec remains. If ``monitor`` is empty, the monitor of the spec remains.
     """
 
     kind: str

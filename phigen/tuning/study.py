@@ -1,4 +1,6 @@
-"""Tuning: the search for the cheapest method for one run of a spec, the confirmation of steps, and a fair timing."""
+"""Tuning: the search for the cheapest method for one run of a spec, tests of the best methods in longer runs, and a
+fair timing.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +27,11 @@ from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 #: PATIENCE: multiple of this share that the run may take at most. ATTEMPTS: number of step sizes that are tried for one
 #: method.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: FINALISTS: number of best methods whose steps are confirmed and timed. BEHIND: largest cost of these methods, as a
-#: multiple of the least cost. ROUNDS: number of rounds of timings.
+#: FINALISTS: number of best methods that are tested in longer runs and timed. BEHIND: largest cost of these methods, as
+#: a multiple of the least cost. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Share of the time budget for longer runs that test methods. If no method has passed the test when the share is used
-#: up, further methods are tested, with one step size each, until one passes.
+#: Multiple of the time budget after which no more methods are tested in longer runs. If no method has passed the test
+#: by then, the tests go on, with one step size for each method, until one passes.
 CONFIRMED = 1.0
 #: Multiple of the time budget after which no further round of timings begins. A round takes about a tenth of the
 #: budget.

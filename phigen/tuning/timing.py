@@ -38,11 +38,12 @@ def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
 
 
 def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
-    """Time the beginning of a run; return the measured seconds, and the estimated seconds of all ``steps`` steps.
+    """Time the beginning of a run; return the measured seconds, and the estimated seconds of all ``steps``
+    steps.
 
     The first steps of a solver in C are slower than later ones, for two reasons: the predictor is not fitted yet, and
-    steps are not made in blocks yet. So the parts grow until one takes long enough. The last part determines the time
-    of the remaining steps.
+    steps are not made in blocks yet. So the run is timed in parts of increasing length, until a part takes long enough.
+    The time of the remaining steps is estimated from the last part.
     """
     seconds, steps_done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:

@@ -116,7 +116,8 @@ class Tuner:
         return not proposed
 
     def add(self, build: Built, method: CompiledMethod, worth: float) -> Curve:
-        """Measure a candidate with several steps; add its curve to those that were tried, and return it.
+        """Measure a candidate with several step sizes. Store the curve of the results in ``tried``, and return the
+        curve.
 
         The measurement ends early if the accuracy costs more than ``worth`` nanoseconds per unit of time.
         """
