@@ -140,7 +140,7 @@ class LatticeProblem(Problem):
         return energies
 
     def method(self, solver: Any) -> Candidate:
-        """Return the method of a lattice solver, which makes runs from the initial state of this problem."""
+        """Return an object that makes runs with a lattice solver, from the initial state of this problem."""
         flat: Any = FlatLattice(solver, self.seer.shape)
         return Candidate(flat, self)
 
@@ -213,7 +213,9 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
 
 
 def _start_with_sizes(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
-    """Return initial state and parameters of the run for a grid of other sizes; None if its arrays have fixed sizes."""
+    """Return initial state and parameters of the run on a grid of other sizes; None if the run has arrays of fixed
+    sizes.
+    """
     assert run.lattice is not None
     try:
         return start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))

@@ -192,7 +192,7 @@ class CompiledMethod(Protocol):
 
 @dataclass(frozen=True)
 class Candidate:
-    """The method of a phigen solver, which makes runs from the initial state of ``problem``."""
+    """A phigen solver as a method for the search. Its runs start from the initial state of ``problem``."""
 
     solver: Backend
     problem: Problem
