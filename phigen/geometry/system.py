@@ -36,7 +36,8 @@ class System:
     Casimirs in the order of the spec, then those that phigen found (``C1``, ``C2``, …). ``declared`` has the names of
     the declared Casimirs. ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables``
     are quantities to record; nothing is proved about them. ``notes`` says which searches were omitted, and why.
-    ``spec`` is the spec of the system, or None if the system was built in Python.
+    ``spec`` is the spec of the system, or None if the system was built in Python. ``standing`` has the parameters that
+    stand for the time, see `frozen`.
     """
 
     name: str
@@ -56,6 +57,7 @@ class System:
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
     spec: Spec | None = field(default=None, repr=False, compare=False)
+    standing: tuple[str, ...] = ()
 
     if not TYPE_CHECKING:
 
@@ -99,7 +101,7 @@ class System:
     def frozen(self) -> System:
         """This system with the time as a parameter, for statements at a fixed time."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
-        return replace(self, parameters=(*self.parameters, *standing), time="")
+        return replace(self, parameters=(*self.parameters, *standing), time="", standing=self.times)
 
     @property
     def positive(self) -> tuple[str, ...]:

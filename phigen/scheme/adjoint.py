@@ -164,7 +164,7 @@ def completed(
         refresh,
         "refresh_adjoint",
         {"now_bar": refresh.outputs[0].values},
-        {TABLE: coefficients.slots},
+        {TABLE: coefficients.prepared_symbols},
         "cotangents of the constant coefficients, from those of the coefficients that change during a run",
     )
     constant = _constant_coefficients(coefficients, differentiated)

@@ -57,7 +57,8 @@ def _flow(system: System, source: Source) -> Flow:
         flows = split(noise_system).flows
     except SpecError:
         raise refused from None
-    if len(flows) != 1:
+    # Matrix exponentials are computed before the steps, for fixed durations. The durations of noise are random.
+    if len(flows) != 1 or flows[0].exponentials:
         raise refused
     return flows[0]
 

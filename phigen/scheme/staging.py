@@ -54,8 +54,13 @@ class Coefficients:
         """The symbols of all coefficients that have been requested so far. The last symbols are those of coefficients
         that change from step to step.
         """
-        entries = (name for e in self.exponentials for name in e.symbols)
-        return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
+        return (*self.prepared_symbols, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
+
+    @property
+    def prepared_symbols(self) -> tuple[str, ...]:
+        """The symbols of all values that ``prepare`` computes: those of `slots`, and the entries of matrix
+        exponentials."""
+        return (*self.slots, *(name for e in self.exponentials for name in e.symbols))
 
     @property
     def everything(self) -> list[Expression]:

@@ -66,15 +66,18 @@ class MatrixExponential:
                 return columns
             columns = wider
 
-    def slopes(self) -> dict[str, Expression]:
+    def slopes(self, *, last: bool = False) -> dict[str, Expression]:
         """Return a dictionary: symbol of an entry of exp(tA) − 1 → time derivative of this entry. The matrix of these
-        derivatives is A exp(tA).
+        derivatives is written as A exp(tA), or as exp(tA) A if ``last``.
         """
         n, entries = self.size, self.symbols
         rates: dict[str, Expression] = {}
         for k, name in enumerate(entries):
             i, j = divmod(k, n)
-            terms = [self.rates[i * n + m] * symbol(entries[m * n + j]) for m in range(n) if j in self.reached[m]]
+            if last:
+                terms = [symbol(entries[i * n + m]) * self.rates[m * n + j] for m in sorted(self.reached[i])]
+            else:
+                terms = [self.rates[i * n + m] * symbol(entries[m * n + j]) for m in range(n) if j in self.reached[m]]
             rates[name] = total([self.rates[k], *(e for e in terms if not e.is_zero)])
         return rates
 

@@ -181,4 +181,4 @@ def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequenc
     images = tower.convert_all(roots)
     n, start = system.dimension, 1 + len(further_expressions)
     poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))
-    return Ring(tower, system.coordinates, poisson, system.poisson, system.times)
+    return Ring(tower, system.coordinates, poisson, system.poisson, (*system.times, *system.standing))

@@ -27,7 +27,7 @@ from phigen.symbolic.expression import (
     symbol,
     total,
 )
-from phigen.symbolic.verdict import Statement, decide_zero
+from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
 
 def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
@@ -148,7 +148,11 @@ def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     """
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
-    return decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
+    statement = decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
+    if flow.exponentials and statement.verdict != PROVED:
+        transported = decide_zero(name, list(_transport_residuals(system, flow)), system.positive, flow.manner)
+        return transported if transported.verdict == PROVED else statement
+    return statement
 
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
@@ -212,6 +216,24 @@ def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expre
     yield from ((f"{c} at t = 0", e) for c, e in zip(names, start, strict=True))
     for c, a, b in zip(names, rates, required, strict=True):
         yield f"rate of {c}", angles_added(a) - angles_added(b)
+
+
+def _transport_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
+    """Yield pairs of a label and an expression; all expressions vanish if Φ_t is the exact flow of its vector
+    field X.
+
+    The expressions are the components of Φ_0 − 1 and of dΦ_t/dt − DΦ_t X. Let Φ_t be rows of exp(tA)w, where products
+    of coordinates are components of w. Then DΦ_t X is linear in the entries of exp(tA), whereas X∘Φ_t contains products
+    of entries. These products are entries too, but a proof without this relation fails.
+    """
+    names = system.coordinates
+    slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes(last=True).items()}
+    start = substitute(flow.increment, {TIME: ZERO, **dict.fromkeys(slopes, ZERO)})
+    rates, field = _rates(flow.increment, slopes), flow.vector_field(system)
+    yield from ((f"{c} at t = 0", e) for c, e in zip(names, start, strict=True))
+    for c, rate, speed, row in zip(names, rates, field, sparse_derivatives(flow.increment, names), strict=True):
+        transported = total([speed, *(row[n] * v for n, v in zip(names, field, strict=True) if n in row)])
+        yield f"rate of {c}", angles_added(rate) - angles_added(transported)
 
 
 def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:

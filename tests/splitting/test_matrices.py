@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from support import TARGETS, compile_text, javascript, solver
 
@@ -207,6 +208,54 @@ def test_matrices_of_any_size_are_exact_to_round_off(rows):
     for entries in (draws, jordan, [0] * rows**2):
         exponential = MatrixExponential(tuple(number(int(e)) for e in entries))
         assert enclosures.enclosed("", exponential, {}).verdict == CHECKED
+
+
+#: A linear part that is driven: a coefficient of the linear equations depends on the time.
+DRIVEN = (
+    PAIRS
+    + "time: t\nparameters: {k: 2, w: 1.3}\n"
+    + "hamiltonian: p1**2/2 + p2**2/3 + k*q1**2/2 - q2**2 + q1*q2/3 + p1*q2/5 - k*q1*cos(w*t)"
+)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_coefficient_that_depends_on_the_time_is_an_unknown(target):
+    compiled = compilation(DRIVEN)
+    (flow,) = compiled.splitting.flows
+    assert [e.size for e in flow.exponentials] == [5]
+    assert {s.verdict for s in check(compiled.system, compiled.splitting)} == {PROVED, CHECKED}
+    solve, x = solver(compiled, target), np.array([0.4, -0.3, 0.8, 0.5])
+
+    def rate(t, y):
+        return solve.vector_field(y, t=t)
+
+    exact = solve_ivp(rate, (0.3, 1.1), x, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    errors = [np.abs(solve.integrate(x, 0.8 / n, n, t0=0.3).x[-1] - exact).max() for n in (4, 8)]
+    assert 12 < errors[0] / errors[1] < 22
+    bar = np.linspace(0.4, -1, 4)
+    pulled = solve.pullback(x, 0.2, 3, bar, t0=0.3)
+    for key, value in {"k": 2, "w": 1.3}.items():
+        ends = [solve.integrate(x, 0.2, 3, t0=0.3, parameters={key: value + d}).x[-1] @ bar for d in (1e-5, -1e-5)]
+        assert pulled.parameters_bar[key] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-7)
+
+
+def test_products_of_coordinates_among_the_unknowns_are_proved():
+    compiled = compilation(
+        "coordinates: [x, y, z]\nparameters: {a: 2}\n"
+        "poisson: {brackets: {x: {y: z - 4*y, z: 4*z - 17*y}}}\nhamiltonian: a*x + a*z - y**2"
+    )
+    (flow,) = compiled.splitting.flows
+    assert [e.size for e in flow.exponentials] == [6]
+    assert [s.verdict for s in check(compiled.system, compiled.splitting)] == [PROVED, PROVED, CHECKED]
+    first, *others = flow.increment
+    planted = replace(compiled.splitting, flows=(replace(flow, increment=(first + first**2, *others)),))
+    assert [s.verdict for s in check(compiled.system, planted)] == [PROVED, REFUTED, CHECKED]
+
+
+def test_noise_along_a_flow_of_random_duration_is_refused():
+    text = PAIRS + "noise: {w: {hamiltonian: p1**2/2 + p2**2/3 + 3*q1**2 + q1*q2/2 + q2**2 + p1*q2 - q1}}\n"
+    with pytest.raises(SpecError, match="needs the flow of the noise w in closed form"):
+        compile_text(text + "hamiltonian: p1**2/2\n", scheme="splitting")
 
 
 def test_a_state_dependent_time_is_refused():
