@@ -32,11 +32,14 @@ def run(
     recordable: Mapping[str, str],
     watched: AllowedNames,
     averaged: Collection[str],
+    *,
+    monitored: bool,
 ) -> Run:
     """Return the run with this name. Errors are reported; values with errors are then replaced by harmless ones.
 
     ``recordable`` maps the names that ``record`` may contain to "", and other names to the reason why they are refused.
-    ``section`` and ``stop`` may use the names in ``watched``, ``average`` those in ``averaged``.
+    ``section`` and ``stop`` may use the names in ``watched``, ``average`` those in ``averaged``. If ``monitored``, steps
+    are unequal in time, so that the number of steps and the time at the end are not known in advance.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")
@@ -58,13 +61,14 @@ def run(
         _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
     elif interval is not None and "stride" in raw:
         _fail(name, "every", "every and stride exclude each other", declared, "give only one of them")
-    row_times = _row_times(name, raw, start, until, step, steps, declared)
+    end = until if until is not None else start + step * steps if step and steps and not monitored else None
+    row_times = _row_times(name, raw, start, end, step, declared)
     if "direction" in raw and "section" not in raw:
         example = "x1" if declared.lattice is None else "M"
         hint = f"section: {example}, for example, records where {example} passes through 0"
         _fail(name, "direction", "direction: the run has no section", declared, hint)
     stride = raw.get("stride", 1)
-    if steps is not None and stride > max(steps, 1):
+    if steps is not None and stride > max(steps, 1) and not (monitored and until is not None):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
     lattice = run_of_lattice(name, raw, declared)
     numbers_of, arrays = _overrides(raw.get("parameters", {}), declared)
@@ -119,16 +123,16 @@ def _row_times(
     name: str,
     raw: Mapping[str, Any],
     start: Fraction,
-    until: Fraction | None,
+    end: Fraction | None,
     step: Fraction | None,
-    steps: int | None,
     declared: Declarations,
 ) -> tuple[Fraction, ...]:
-    """Return the times of ``at`` in the order of the run, without repetitions."""
+    """Return the times of ``at`` in the order of the run, without repetitions. If the time ``end`` of the end is known,
+    later times are reported.
+    """
     nodes = raw.get("at") or ()
     if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):
         _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give only one of them")
-    end = until if until is not None else start + step * steps if step and steps else None
     times = []
     for node in nodes:
         time = declared.number(node, declared.numbers())

@@ -91,8 +91,11 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     watched = watched_names(declared, observed, numbers)
     averaged = [*numbers, *broken]
     listed_runs = {n: r for n, (_, r) in raw.get("runs", {}).items() if r is not None}
-    runs = {n: run(n, r, declared, columns, watched, averaged) for n, r in listed_runs.items()}
-    if "monitor" not in raw:
+    monitored = "monitor" in raw
+    runs = {
+        n: run(n, r, declared, columns, watched, averaged, monitored=monitored) for n, r in listed_runs.items()
+    }
+    if not monitored:
         for run_ in runs.values():
             expect_rows_to_average(run_, declared)
     inputs = _inputs(raw.get("inputs", ()), declared)
@@ -132,7 +135,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,
         "sweeps": {
-            n: sweep(n, s, runs, declared, numbers, monitored="monitor" in raw)
+            n: sweep(n, s, runs, declared, numbers, monitored=monitored)
             for n, (_, s) in raw.get("sweeps", {}).items()
             if s is not None
         },

@@ -85,6 +85,24 @@ def test_run_has_the_rows_of_the_command(text, target, tmp_path, monkeypatch):
         np.testing.assert_allclose(trajectory.energy, written["energy"], rtol=1e-11, atol=1e-12)
 
 
+def test_rows_of_monitored_runs_are_compared_with_no_estimate_of_their_end():
+    """With a monitor, steps are unequal in time, so neither the number of steps until a time nor the time after a
+    number of steps is known in advance.
+    """
+    text = MONITORED[: MONITORED.index("runs:")].replace("(x**2 + y**2)**(3/4)", "(x**2 + y**2)**(3/4)/10")
+    runs = """runs:
+  until: {initial: [1, 0, 0, 0.6], step: 0.5, until: 0.9, stride: 9}
+  fast: {initial: [1, 0, 0, 0.6], step: 0.001, steps: 8, at: [0.0005, 0.0007]}
+"""
+    solver = phigen.compile(phigen.spec.loads(text + runs), target="numpy")
+    until = solver.run("until")
+    assert len(until.t) > 2
+    assert until.tau[1] == pytest.approx(4.5)
+    assert until.t[-1] == pytest.approx(0.9)
+    slow = text.replace("/10", "*100") + runs.replace("[0.0005, 0.0007]", "[0.05, 0.7]")
+    assert phigen.compile(phigen.spec.loads(slow), target="numpy").run("fast").t[1:3] == pytest.approx([0.05, 0.7])
+
+
 def test_arguments_take_the_place_of_settings():
     solver = pickle.loads(pickle.dumps(phigen.compile(phigen.spec.loads(DRIVEN))))
     by_hand = solver.integrate([0.3, 0.2], 0.05, 40, 9, t0=0.5, A=0.6, omega=1.5)
