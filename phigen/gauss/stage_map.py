@@ -86,6 +86,12 @@ class StageMap:
         return tuple(frame_symbol(k) for group, places in groups if group.copies for k in places)
 
 
+def _moves(system: System, i: int) -> bool:
+    """Whether brackets or a vector force may change a coordinate."""
+    pushed = system.forces is not None and not system.forces.vector[i].is_zero
+    return pushed or any(not e.is_zero for e in system.poisson[i])
+
+
 def frame_symbol(place: int) -> str:
     """Return the symbol for the component of a frame F that belongs to the unknown with index ``place``."""
     return Symbol(FRAME, place)
@@ -98,7 +104,7 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
     plain_indices = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
     scaled = tuple(i for part in realisation.logarithms for i in part.indices)
     if realisation.exact:
-        plain_indices = tuple(i for i in plain_indices if any(not e.is_zero for e in system.poisson[i]))
+        plain_indices = tuple(i for i in plain_indices if _moves(system, i))
     if not (plain_indices or scaled or realisation.groups or system.times):
         # If all brackets are zero, no unknown is needed. One coordinate is an unknown nevertheless, since arrays in C
         # have at least one entry.

@@ -38,8 +38,8 @@ def run(
     """Return the run with this name. Errors are reported; values with errors are then replaced by harmless ones.
 
     ``recordable`` maps the names that ``record`` may contain to "", and other names to the reason why they are refused.
-    ``section`` and ``stop`` may use the names in ``watched``, ``average`` those in ``averaged``. If ``monitored``, steps
-    are unequal in time, so that the number of steps and the time at the end are not known in advance.
+    ``section`` and ``stop`` may use the names in ``watched``, ``average`` those in ``averaged``. If ``monitored``,
+    steps are unequal in time, so that the number of steps and the time at the end are not known in advance.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")

@@ -92,9 +92,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     averaged = [*numbers, *broken]
     listed_runs = {n: r for n, (_, r) in raw.get("runs", {}).items() if r is not None}
     monitored = "monitor" in raw
-    runs = {
-        n: run(n, r, declared, columns, watched, averaged, monitored=monitored) for n, r in listed_runs.items()
-    }
+    runs = {n: run(n, r, declared, columns, watched, averaged, monitored=monitored) for n, r in listed_runs.items()}
     if not monitored:
         for run_ in runs.values():
             expect_rows_to_average(run_, declared)

@@ -675,3 +675,12 @@ def test_javascript_has_the_attitude_of_numpy_after_kicks_too(case):
     session.set_parameters({name: 1.1 * value for name, value in session.parameters.items()}).step(0.05)
     assert turned == pytest.approx(session.attitude.ravel(), abs=3e-15)
     assert not expected.position or moved == pytest.approx(session.position, abs=3e-15)
+
+
+@pytest.mark.parametrize("case", ["body, split", "so(4), split"])
+def test_javascript_has_the_derivative_of_a_step_with_an_attitude(case):
+    compilation = compile_spec(spec_of(CASES[case]), order=2, tangent=True)
+    x0 = np.linspace(0.4, 1.0, compilation.system.dimension)
+    derivative = javascript(compilation, f"x0: {x0.tolist()}", "", "Array.from(s.stepTangent(0.3))")
+    _, tangent = solver_of(compilation, "numpy").step_tangent(x0, 0.3)
+    assert np.reshape(derivative, tangent.shape) == pytest.approx(tangent, abs=1e-14)

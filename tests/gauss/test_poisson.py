@@ -234,6 +234,16 @@ def test_check_proves_the_momentum_map_of_a_step():
     assert any("quadratic momentum map" in s.name and s.verdict == "proved" for s in statements)
 
 
+def test_a_vector_force_moves_a_coordinate_without_brackets():
+    compiled_system = compile_text(
+        "coordinates: [q, p, z]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2/2 + p**2/2 + z*q\n"
+        "forces: {vector: {z: -z/2}}\nscheme: gauss\norder: 16\n"
+    )
+    assert {s.verdict for s in examine(compiled_system.spec).statements} <= {"proved", "checked numerically"}
+    end = solver(compiled_system, "c").integrate([0.3, 0.2, 0.8], 0.25, 4).x[-1]
+    assert end[2] == pytest.approx(0.8 * np.exp(-0.5), rel=1e-13)
+
+
 #: A bracket that is neither constant nor linear, and not constant in logarithms of the coordinates either.
 CURVED = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: x*y + z**2}}}\nhamiltonian: x**2 + y**2\n"
 #: The bracket {u, v} = uv of u = x + y and v = x − y, written in x and y: it is constant in log u and log v, but phigen

@@ -130,6 +130,16 @@ def test_what_is_not_allowed_leaves_all_as_it_was(target):
     assert (session.x.tolist(), session.steps) == (before.tolist(), 3)
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_parameters_can_be_changed_after_a_failed_step(target):
+    """Coefficients that depend on the time are not finite after a step that is far too large."""
+    session, at = session_of("duffing", target)
+    with pytest.raises(StepError):
+        session.step(at.h, 3).step(1e300)
+    fresh = session.solver.session(session.x, t0=session.t, A=0.7).step(at.h, 5)
+    assert session.set_parameters(A=0.7).step(at.h, 5).x == pytest.approx(fresh.x, rel=1e-13)
+
+
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", SYSTEMS)

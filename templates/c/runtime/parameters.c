@@ -1,6 +1,7 @@
 #ifndef PHI_FILE_PARAMETERS
 #define PHI_FILE_PARAMETERS
 #include <math.h>
+#include <string.h>
 
 #include "algebra.c"
 #include "model.h"
@@ -16,6 +17,9 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     changed.h = (double)NAN; /* so that the next step computes all coefficients */
 #if PHI_MONITOR
     phi_choose_gauge(&changed.params, changed.x, changed.gauge);
+#endif
+#if PHI_RENEWED
+    memset(changed.coef, 0, sizeof changed.coef); /* a failed step may have left values that are not finite */
 #endif
     PHI_TRY_PARAMETERS(changed)
     if (!phi_finite(changed.x, PHI_DIM) PHI_OR_BAD_PARAMETERS(changed))

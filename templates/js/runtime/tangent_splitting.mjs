@@ -1,3 +1,4 @@
+import { applyFlow } from "./flow_alone.mjs";
 import { DIM, FLOWS, TANGENTS } from "./model.mjs";
 import { flowsOfRun } from "./run_plain.mjs";
 import { identity, multiplied } from "./tangent.mjs";
@@ -16,7 +17,7 @@ export function differentiateStage(solver, stage, at) {
   const derivative = identity();
   for (const [part, row] of flowsOfRun()) {
     TANGENTS[part](solver.coef[0][row], y, slope);
-    FLOWS[part](solver.coef[0][row], y, increment);
+    applyFlow(FLOWS[part], solver.coef[0][row], y, increment);
     const product = multiplied(slope, derivative);
     for (let k = 0; k < DIM * DIM; k++) derivative[k] += product[k];
     for (let i = 0; i < DIM; i++) {
