@@ -70,7 +70,7 @@ class Turning:
 
     @property
     def left(self) -> Expression:
-        """The multiple of a Casimir by which the attitude is rotated once in a step; 0 unless ``put_back`` is set."""
+        """The multiple of a Casimir whose flow rotates the attitude once in a step; 0 unless ``put_back`` is set."""
         return self.casimir if self.put_back else ZERO
 
 

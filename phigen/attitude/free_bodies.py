@@ -117,7 +117,7 @@ class _SortedAxes:
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """The factors w_l of t and −β_h n of the integral, in the formula for θ at the head of the file."""
+        """The coefficients w_l and −β_h n in the formula for θ at the head of the file."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(

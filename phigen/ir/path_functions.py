@@ -315,11 +315,12 @@ class _LaneFunctions:
     def variation(
         self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, description: str
     ) -> ir.Function:
-        """Return the function that adds a product to the derivatives of the path. One factor is ∂(π p)/∂m at order j;
-        the other factor is the derivatives of the path at order k − j.
+        """Return the function that adds one product of two Taylor coefficients to the derivatives of the path.
 
-        The derivatives are matrices with ``width`` columns, in the member ``array`` of the record ``e``. The text
-        ``description`` names the derivatives in the comment of the generated function.
+        The factors are the coefficient of order j of ∂(π p)/∂m, and the coefficient of order k − j of the derivatives.
+        The generated function has the arguments j and k. The derivatives are matrices with ``width`` columns, in the
+        member ``array`` of the record ``e``. The text ``description`` names the derivatives in the comment of the
+        generated function.
         """
         statements = list[ir.Statement]()
         for e in jacobian:

@@ -6,8 +6,8 @@ along this axis. The proof holds for every larger box, for two reasons. First, �
 2r reads at most 4r + 1 adjacent sites. The box has room for these sites without an overlap. Second, α at two sites with
 a larger distance reads no site twice.
 
-Two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p = h∇H
-the increment is hπ∇H up to O(h²). Since a stage is also symmetric, its order is 2.
+Two more proofs concern a stage: the formula for y at a site solves α(y, p) = x for any p; and with p = h∇H the
+increment is hπ∇H up to O(h²). Since a stage is also symmetric, its order is 2.
 """
 
 from __future__ import annotations

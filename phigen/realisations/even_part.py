@@ -137,10 +137,10 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
-    """Return a polynomial s in p, found under the assumption that 0 and −s are the only eigenvalues of M².
+    """Return a polynomial s in p such that 0 and −s may be the only eigenvalues of M², where M is the ``matrix``.
 
-    s follows from the traces of M² and M⁴. Returns None if the traces contradict the assumption. If they do not, the
-    caller must still prove it.
+    s is computed from the traces of M² and M⁴. Returns None if the traces exclude such an s. Otherwise the caller must
+    prove that s has this property.
     """
     n = range(len(matrix))
     if not _may_have_root(matrix):

@@ -1,11 +1,11 @@
 """The flow of a free rigid body by elliptic functions: ẋ_i = α_i x_j x_k for cyclic indices i, j, k, where some α_i are
 positive and some negative.
 
-The differences of the E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max −
-min, and R the third E_i minus min. `phigen.symbolic.elliptic` defines κ as a function of t, P and R, and S and C as
-functions of κ and P. Then the addition theorem of Jacobi's functions gives the state x' after the time t:
+The differences of the E_i = α_j α_k x_i² are constant. Let E_max and E_min be the largest and the smallest of them, P =
+E_max − E_min, and R the third E_i minus E_min. `phigen.symbolic.elliptic` defines κ as a function of t, P and R, and S
+and C as functions of κ and P. Then the addition theorem of Jacobi's functions gives the state x' after the time t:
 
-    x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
+    x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − E_max S² = C² − E_min S²,
 
 where σ_i > 0, except that σ_i = C for the smallest E_i. The time enters only through κ. So an error of κ changes only
 the time over which the body moves; energy and Casimirs stay constant. No phase is stored between steps, and no formula
@@ -207,7 +207,8 @@ def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Exp
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression in the independent symbols x_i, α_i and S.
 
-    All expressions vanish if the increments solve the equations of motion. Let E_m be the largest E_i. Then σ_m = 1,
+    All expressions vanish if the increments solve the equations of motion. The E_i, σ_i and D are those at the head of
+    the file, but σ_i and D are computed from S alone. Let E_m be the largest E_i. Then σ_m = 1,
     and σ_i = √(1 − (E_m − E_i)S²) for the other two indices i. The product of the two square roots is the time
     derivative of S. Further expressions compare the two formulas for the differences σ_j σ_k − D in `Addition.changes`.
     """

@@ -277,7 +277,7 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: Name of the relative coordinates in specs → function that returns the division H = A + B.
+#: Name of the relative coordinates in specs → function that returns the Kepler motions of A, and B = H − A.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

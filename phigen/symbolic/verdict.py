@@ -67,7 +67,7 @@ def decide_zero(
 
     ``residuals`` are pairs (label, expression). If the statement is refuted, its text contains the label of a residual
     that does not vanish, such as ``(x1, x2, x3)``. ``positive`` are the symbols that take positive values only.
-    ``detail`` is the detail of a proved statement.
+    ``detail`` is a remark that a proved statement carries.
     """
     nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:

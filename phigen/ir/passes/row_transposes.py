@@ -64,13 +64,13 @@ class Handed:
 class Transpose:
     """A transposed function before the lowering, and the arrays that it reads and writes.
 
-    The function reads cotangents of the kind ``seed``. They are in the arrays of cotangents that belong to the fields
-    with the numbers ``fields``. If ``fields`` is empty, they are in the arrays ``varied`` of the row record. First the
-    function adds contributions of other sites to the cotangents. An earlier loop has stored these contributions, and
-    the field ``received`` lists them. The function stores its own contributions to other sites in arrays, and the field
-    ``handed`` lists these contributions. ``summed`` is the number of sums over bonds or pairs that the function reads;
-    the cotangents of these sums are stored in the arrays from number ``sums_from`` on. The function also writes the
-    fields of the lattice that are listed in ``recomputed``.
+    The function reads cotangents of the kind ``seed``. The tuple ``fields`` contains numbers of fields of the lattice;
+    the function reads the cotangents of these fields. If ``fields`` is empty, it reads the arrays ``varied`` of the row
+    record. Then the function adds contributions of other sites, which an earlier loop has stored; ``received`` lists
+    these contributions. The function also stores contributions to other sites, which ``handed`` lists. ``summed`` is
+    the number of sums over bonds or pairs that the function reads; the cotangents of these sums are stored in the
+    arrays from number ``sums_from`` on. The function also writes the fields of the lattice that are listed in
+    ``recomputed``.
     """
 
     function: ir.Function

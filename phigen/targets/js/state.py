@@ -170,7 +170,7 @@ SOLVER = (
 )
 
 
-#: The options of the constructor for lattices, in blocks. The blocks of lattices have no fields.
+#: The options of the constructor for lattices, in blocks. These blocks declare no fields of the class Solver.
 LATTICE = (
     StateFields(
         options=(

@@ -34,8 +34,9 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """Return the declarations of the constants that an implicit step needs. Only steps along a path have the numbers of
-    Taylor series among these constants.
+    """Return the declarations of the constants that an implicit step needs.
+
+    Steps along a path have more constants: how many Taylor series the path and its derivatives have.
     """
     path, varied = step.path, step.varied_path
     return [

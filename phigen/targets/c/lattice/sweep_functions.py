@@ -372,7 +372,8 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
     """Yield the text of the loops that evaluate a kernel of a stage, and of the function that calls the loops for a row
     segment.
 
-    If the kernel ``end`` is passed, the function evaluates either kernel: ``end`` updates x at the end of a stage.
+    The kernel ``end`` updates x at the end of a stage. If it is passed, the function has the loops of both kernels, and
+    its argument ``to`` selects one of them.
     """
     program, layout = loops.program, loops.layout
     adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
