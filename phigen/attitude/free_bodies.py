@@ -15,7 +15,7 @@ also defines P and R. S, C, D and κ are defined in `phigen.symbolic.elliptic`. 
 
 Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the polar angle of the point
 
-    (1 − (Q − WC)T²/2(1 + D),  LS(c/L² + β_m(Q + W)T²/2(1 + D))).
+    (1 − (Q − WC)T²/(2 + 2D),  LS(c/L² + β_m(Q + W)T²/(2 + 2D))).
 
 An error of θ does not change the momentum in space. Near x' = −x, where M is undefined, the attitude has relative
 errors of about 1e-16/ν with ν = 1 + x·x'/|x|². This occurs near the separatrix, when the body moves from one unstable
