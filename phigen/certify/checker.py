@@ -151,11 +151,11 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # "rest" adds an error for the omitted terms of a Taylor series. The C may omit the terms a[3:], and omits
-            # all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that
-            # contains the path, for the Taylor coefficient of the same order as a[3]. By Lagrange's form of the
-            # remainder, tail also bounds the sum of all terms from a[3] on. The divisors of the omitted terms are at
-            # least a[2].
+            # "rest" adds an error for the omitted terms of a Taylor series. Its arguments are a: a[2] is a lower bound
+            # for the divisors of the omitted terms. The C may omit the terms a[3:], and omits all later terms. The
+            # error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that contains the path, for
+            # the Taylor coefficient of the same order as a[3]. By Lagrange's form of the remainder, tail also bounds
+            # the sum of all terms from a[3] on.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]

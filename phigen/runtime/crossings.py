@@ -44,8 +44,8 @@ _MOST_NEWTON = 8
 #: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps. The first of these numbers with which no step
 #: fails is used: a single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Tolerance for a zero, which is a fraction of a step. A change of the fraction below the tolerance does not change the
-#: state.
+#: Tolerance for the position of a zero in a step, as a fraction of the step. A smaller change of the position does not
+#: change the state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
 #: Direction of a crossing → signs s for which s·g increases through zero as time increases.
@@ -155,9 +155,9 @@ class CrossingFinder(Generic[C]):
     def _interpolated_states(self, session: C) -> Floats:
         """Return states (points, DIM) inside the last step, from the collocation polynomial of the method.
 
-        The array is empty if the method has no collocation polynomial. The array is also empty if a monitor rescales
-        the time and the function whose zeros are the crossings depends on the time: the times inside a step are then
-        unknown.
+        The array is empty if the method has no collocation polynomial. The array is also empty if the spec has a
+        monitor, and the function whose zeros are the crossings depends on the time: with a monitor, the times inside a
+        step are unknown.
         """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):

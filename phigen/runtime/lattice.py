@@ -703,8 +703,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resume: bool = True,
         progress: Progress | None = None,
     ) -> LatticeSeries:
-        """Integrate as planned, and record the quantities ``names``. Possible names, files and errors are those of
-        `series`.
+        """Integrate as planned, and record the quantities ``names``.
+
+        The allowed names, the files and the errors are those of `series`.
         """
         recordable_names = recordable(self.interface)
         if strange := [name for name in names if name not in recordable_names]:

@@ -172,7 +172,7 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols for the entries of g − 1, where g is the group element of a step up to the start of a flow."""
+    """Return the symbols for the entries of g − 1, where g is the group element of all earlier flows of the step."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 

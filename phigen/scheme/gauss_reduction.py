@@ -80,8 +80,7 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 
 
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
-    """Whether two brackets are 0: that of any two unknowns in ``iterated``, and that of any two unknowns in
-    ``followers``.
+    """Whether all brackets between unknowns in ``iterated`` are 0, and all brackets between unknowns in ``followers``.
 
     This is so if momenta are iterated and positions are followers. The result is False if some unknown other than the
     time is in neither of the two lists.

@@ -32,11 +32,11 @@ def transposed_at_ends(
 ) -> list[tuple[str, Ends, Kernel]]:
     """Return the loops over bonds or pairs in which each site collects its own cotangents.
 
-    No two sites write to the same place. A loop is given by the end at which the site lies, the bonds or pairs, and the
-    kernel. If every bond or pair contributes to both of its sites, there is one loop. If also ``summed`` is true, the
-    kernel of this loop computes the sums of ``ends``, in addition to the cotangents. If ``ends`` selects an end or a
-    colour, there are two loops. In the first of the two the site is the end b of the bonds, and the cotangents of the
-    sites at the ends a are read. In the second the site is the end a.
+    No two sites write to the same place. A loop is given by three values: the end of the bonds or pairs at which the
+    site lies; the bonds or pairs; and the kernel. If every bond or pair contributes to both of its sites, there is one
+    loop. Then its kernel computes the sums over bonds or pairs too, if ``summed`` is true. If ``ends`` selects an end
+    or a colour, there are two loops. In the first, the site is the end b of its bonds, and the loop reads the
+    cotangents of the sites at the ends a. In the second, the site is the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)

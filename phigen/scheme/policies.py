@@ -248,8 +248,8 @@ class LatticeTangentPolicy(Policy):
     carried_shrinking: float = number(0.5, "a residual has shrunk if it is below this fraction of the one before")
 
 
-#: The groups of constants that the runtimes of all languages share. The key is the name of the group. The file of the
-#: runtime with the constants of the group has the same name.
+#: The groups of constants that the runtimes of all languages share. The key is the name of the group. In each runtime,
+#: the file that defines the constants of a group has the name of the group.
 POLICIES: dict[str, Policy] = {
     "start_policy": StartPolicy(),
     "measure_policy": MeasurePolicy(),

@@ -613,11 +613,11 @@ class Partners:
     """Sums over the bonds or pairs of a site, as functions of the parameters. The sums of a sweep are in
     `Sweep.gather`.
 
-    ``energy`` has half of each energy, since each energy is counted at both of its sites. ``field`` has the forces or
-    rates of the vector field. For steps that solve an `Equation`, ``varied`` has the forces, and their derivatives in
-    the direction of a variation of the fields. ``observed`` has the densities of observables. ``of_parts`` has the
-    energies of parts of H and their derivatives, by the name of the kernel that reads them (`PartRates`). ``graph``
-    says that the bonds are those of a graph.
+    ``energy`` has half of the energy of a bond or pair, since a bond or pair is counted at both of its sites. ``field``
+    has the forces or rates of the vector field. For steps that solve an `Equation`, ``varied`` has the forces, and
+    their derivatives in the direction of a variation of the fields. ``observed`` has the densities of observables.
+    ``of_parts`` has the energies of parts of H and their derivatives, by the name of the kernel that reads them
+    (`PartRates`). ``graph`` says that the bonds are those of a graph.
     """
 
     energy: Gather

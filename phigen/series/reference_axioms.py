@@ -71,8 +71,8 @@ class _Parts:
     def bracket(self, f: int, g: int, degree: int) -> Any:
         """Return those terms of {f, g} that have the degree ``degree`` in p.
 
-        The bracket is {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c. The arguments ``f`` and ``g`` are numbers of
-        components. The components of α come first, then those of β.
+        The bracket is {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c. The arguments ``f`` and ``g`` are indices
+        of components. The components of α have the first indices, and those of β the next.
         """
         splits = [(k, degree + 1 - k) for k in range(degree + 2)]
         terms = (

@@ -119,7 +119,8 @@ class Tuner:
         """Measure a candidate with several step sizes. Store the curve of the results in ``tried``, and return the
         curve.
 
-        The measurement ends early if the accuracy costs more than ``worth`` nanoseconds per unit of time.
+        The measurement ends early if the candidate needs more than ``worth`` nanoseconds per unit of time of the run
+        to reach the accuracy that is asked for.
         """
         setting = build.setting
         self._known[build.fingerprint] = setting

@@ -20,8 +20,9 @@ from phigen.symbolic.special import SPECIAL
 #: versions for all arguments, which the solver defines in place of library functions.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: Maps from elementary functions to their versions. SIMD is for loops over lanes, IN_LANES for loops over sites.
-#: IN_LANES omits functions with a removable singularity, since their versions are polynomials for small arguments.
+#: Maps from elementary functions to their vector versions. SIMD is for loops over lanes, IN_LANES for loops over sites.
+#: IN_LANES omits functions with a removable singularity: the vector versions of these are correct for small arguments
+#: only.
 #: FULL_RANGE has the members of IN_LANES that are called for arguments of any size.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
