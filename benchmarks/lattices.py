@@ -225,7 +225,8 @@ def shown(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
          f"{r['generated'] / r['by hand']:.2f}") for r in found["kernels"]
     ]  # fmt: skip
     text = (
-        "Processor time of a step for each site. Runs of both programs alternate, and the smallest time counts."
+        "Processor time of a step, divided by the number of sites. "
+        "Runs of both programs alternate, and the smallest time counts."
         f"\n\n{table(head, first)}\n"
     )
     head = (

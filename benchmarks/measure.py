@@ -32,7 +32,8 @@ FINEST = 60
 #: Largest number of runs over the long horizon for one method and target.
 MOST_LONG_RUNS = 6
 
-#: Largest Casimir error of phigen's runs; a larger error means that Newton's method did not converge.
+#: Largest Casimir error of phigen's runs. A larger error means that Newton's method did not converge, or that steps are
+#: not Poisson maps.
 CONVERGED = 1e-10
 
 #: Runs that take more seconds than this are timed only once.
@@ -142,7 +143,7 @@ def run(method: Method, setting: float, horizon: float, samples: int, judge: Jud
     errors = judge.errors(done.states)
     status = "ok"
     if method.family == "phigen" and not errors["casimir"] < CONVERGED:
-        status = "Casimir lost"
+        status = f"Casimir error above {CONVERGED:.0e}"
     if not math.isfinite(errors["energy"]):
         status = "not finite"
     return Result(**{**result.__dict__, **errors, "status": status})
