@@ -272,7 +272,7 @@ def _method(label: str) -> str:
 def _lattice_entry(specification: Spec, fact: dict[str, Any]) -> str:
     run = longest_run(specification)
     image = f"![{specification.title}: a run over space and time](figures/gallery/{specification.name}.svg)"
-    method_text = f"Sites: {fact['structure']}. Method: {_method(fact['method'])}, order {fact['order']}."
+    method_text = f"Lattice: {fact['structure']}. Method: {_method(fact['method'])}, order {fact['order']}."
     length = (
         f"Run `{run.name}`: {' × '.join(map(str, fact['sites']))} sites, {run.steps} steps of size {float(run.step):g}."
     )

@@ -26,7 +26,7 @@ def described(cell: Cell) -> str:
     if cell.relation == GRID:
         axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
         return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
-    return "graph, its bonds given at run time" if cell.relation == "graph" else "all pairs of sites"
+    return "graph, its bonds given at run time" if cell.relation == "graph" else "all sites interact in pairs"
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
