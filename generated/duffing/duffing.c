@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 2e1d83c3eb35f138f4913d2a29045c5ad4435101fe2d3fdb81501dd17dd0410e
+ * body-sha256: e207c6d430ae474d3066663124302de9b064c389d5b9375b541b10f27e7aa71e
  */
 #include "duffing.h"
 #include <float.h>
@@ -142,8 +142,8 @@ static int duffing_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
-   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms
+   that are small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int duffing_advance(duffing_solver *s, const double *change, const double *rest)
 {
     double x[duffing_DIM], carry[duffing_DIM];
@@ -159,7 +159,7 @@ static int duffing_advance(duffing_solver *s, const double *change, const double
     return 1;
 }
 
-/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
+/* Solve `matrix` * x = `side` by elimination with pivoting; `side` receives x. Returns 0 if singular. */
 static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[duffing_DIM])
 {
     for (int k = 0; k < duffing_DIM; ++k) {
@@ -229,7 +229,7 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 }
 
 #define duffing_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b7c687ecf90ac9696682387cc14418b099b9dc8642cda4c6ffb4d0b810b54615
+ * body-sha256: ac01ba7a2e834e86c28721446651441ef4757e0d7389871256b480576efbe2a5
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -32,7 +32,7 @@ typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing
     duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
+/* Predictor, which affects the speed only: the last solution and backward differences, for extrapolation. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     double difference[duffing_DIFFERENCES][duffing_DIM]; /* the last solution, then its differences */
@@ -64,12 +64,12 @@ duffing_status duffing_init(duffing_solver *s, const duffing_params *params, con
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 duffing_status duffing_step(duffing_solver *s, double h);
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   duffing_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns duffing_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 

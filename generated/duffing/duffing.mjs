@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5ca5ec1ff1c1e059ead1fd260922d1b70ba7c28994eba0394e982929d5006b4d
+ * body-sha256: f417ae7358eaf8cabbbe874425ad427e00a79ef5bb7d4993fa438eb840c6ee11
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -186,7 +186,7 @@ const SHRINKING = 0.25;
 
 /** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Longer steps may change the energy by at most this fraction. */
+/** Largest relative energy change of steps beyond PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
@@ -239,7 +239,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if `count` is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -552,8 +552,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|. It is NaN or infinite if a component of the correction is.
+ * Relative size of a correction of y: the largest |correction_i| / (|y_i| + FLOOR max_j |y_j|). It is NaN or
+ * infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -788,8 +788,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small contains the compensation term, and other
- * terms that are much smaller than change.
+ * Add `change` + `small` to the state by compensated summation. `small` contains the compensation term, and
+ * other terms that are much smaller than `change`.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change
@@ -814,7 +814,7 @@ function advance({ x, carry }, change, small) {
 const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
+ * Solve `matrix` · x = `side` by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
  * @param {Float64Array} side is overwritten with the solution

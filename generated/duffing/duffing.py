@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 9f04cbaa1fdc7d62c3d6f0cf20ed6280f73be1485b224a5b68ee4f4ef32827e9
+# body-sha256: 1aecafd2a5045aa896abec633e663bf7aafb3f15dc88601b37f492ae4ad2a622
 import numpy as np
 
 VERSION = "0.1.0"
@@ -215,7 +215,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):
@@ -250,7 +250,7 @@ SHRINKING = 0.25  # iterations are slow if a correction exceeds this fraction of
 def _size(y, delta):
     """Return the relative size of the correction delta of y for each member.
 
-    It is the largest ratio of |delta_i| to |y_i| + FLOOR times the largest |y_j|.
+    It is the largest |delta_i| / (|y_i| + FLOOR max_j |y_j|).
     """
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
@@ -361,7 +361,7 @@ def step(x, h, t0=0.0, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
+    """Return `value` for each member of x, as an array (members,). A single number is returned unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 9d9b90fd9f69bbdb0c1ebe0ee06a8dcf45ca24c335ebf0bb0895308356b2cd7c
+ * body-sha256: 6e11aa4bb284272f8b64e4e4337c1a27a591dfe59fe22d7ecafcdda32c3bd9a0
  */
 #include "food_web.h"
 #include <limits.h>
@@ -136,7 +136,7 @@ static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the bits of shifted; the lowest are the integer k */
+    uint64_t bits; /* the bits of `shifted`; the lowest bits are the integer k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -164,7 +164,7 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* For each site a, the sum of the forces of H_1 by its neighbours b, for bonds that begin at a. */
+/* For each site a, the forces of H_1 on a, summed over its neighbours b. */
 static inline void food_web_gather1(const double *coef, const food_web_row *row, double *const *at_bonds,
     double sign)
 {
@@ -341,7 +341,7 @@ static void food_web_take(const food_web_solver *s, double *const *fields, doubl
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
+/* Store a parameter at all sites: the array `values`, or `value` at each site if `values` is NULL. */
 static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;

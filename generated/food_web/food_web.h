@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dd739f0fb4dab20cd9a8d99d91bd01ccda6899802ecb117ca01af4b81ac80495
+ * body-sha256: 33a4c6f3cb3c322814f10d033d72c0905d22bfa9b1274b0aaece48f5ddb1f6ce
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -25,7 +25,7 @@ extern const food_web_params food_web_default_params;
 
 enum { food_web_ARRAYS = 2 };        /* number of arrays over sites: fields, parameters */
 enum { food_web_COEFFICIENTS = 26 }; /* number of coefficients: functions of params and h */
-enum { food_web_GATHERED = 1 };      /* number of sums over bonds or pairs that are stored for each site */
+enum { food_web_GATHERED = 1 };      /* for each site, number of stored sums over its bonds or pairs */
 enum { food_web_BOND_ARRAYS = 1 };   /* number of parameters at bonds */
 
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
@@ -44,7 +44,7 @@ typedef struct {
     int *bonds; /* for each site, the index in `other` of the first bond that starts there */
     int *middle; /* for each site, the index in `other` of the first bond that ends there */
     int *other, *number; /* for each bond of a site: the site at the opposite end, the number of the bond */
-    double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
+    double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of `other`, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
@@ -68,8 +68,8 @@ typedef struct {
 /* Bytes that food_web_init needs for these sizes and this number of bonds; 0 if they are refused. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
-/* Initialise *s with the state x0[field][site]. work has food_web_work_size(sizes, bonds->count) bytes,
-   aligned as by malloc, and must outlive *s. bonds may be NULL if there are none, params for the defaults;
+/* Initialise *s with the state x0[field][site]. `work` has food_web_work_size(sizes, bonds->count) bytes,
+   aligned as by malloc, and must outlive *s. `bonds` may be NULL if there are none, params for the defaults;
    all arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are not admissible, a bond does not connect
    two different sites, a value is not finite, or a parameter that must be positive is not. */
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: c7351ee99c84e20b78b008155cd93e209ebc54efcc396d72f9dec08bdc192746
+ * body-sha256: 025e6f4ed67fac06340f77c9fcadfdb6377fc8e62d89dfdd3776a55e44ec1494
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -125,8 +125,8 @@ static int guiding_centre_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
-   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms
+   that are small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int guiding_centre_advance(guiding_centre_solver *s, const double *change, const double *rest)
 {
     double x[guiding_centre_DIM], carry[guiding_centre_DIM];
@@ -142,7 +142,7 @@ static int guiding_centre_advance(guiding_centre_solver *s, const double *change
     return 1;
 }
 
-/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
+/* Solve `matrix` * x = `side` by elimination with pivoting; `side` receives x. Returns 0 if singular. */
 static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centre_DIM],
     double side[guiding_centre_DIM])
 {
@@ -215,7 +215,7 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 }
 
 #define guiding_centre_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
+#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -456,7 +456,7 @@ enum {
 #define guiding_centre_LEAST_SHARE 1e-5
 /* tolerated error of dm/dt at the end m of a path, relative to |m| + |dm/dt| */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
-/* step of difference quotients, relative to p: about the square root of its rounding errors */
+/* step of difference quotients, relative to p: about the square root of the rounding error */
 #define guiding_centre_DIFFERENCE 1e-7
 #define guiding_centre_SOLVED 4e-16        /* iterations end if the residual is below this, relative to p */
 #define guiding_centre_NEARLY_SOLVED 1e-12 /* after a residual below this, slow iterations end */
@@ -479,9 +479,9 @@ static int guiding_centre_holds(const double *coef, const double p[guiding_centr
     return 1;
 }
 
-/* Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start,
-   mean the mean of m - start. Terms are added until they are negligible. Returns 0 if guiding_centre_TERMS
-   terms do not suffice. */
+/* Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m(0) = `start`, by its Taylor series. `change` receives
+   m(1) - m(0), and `mean` the mean of m(t) - m(0). Terms are added until they are negligible. Returns 0 if
+   guiding_centre_TERMS terms do not suffice. */
 static int guiding_centre_piece(const double *coef, const double p[guiding_centre_DIM],
     const double start[guiding_centre_DIM], double change[guiding_centre_DIM],
     double mean[guiding_centre_DIM])
@@ -513,10 +513,10 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
-   the end of the path minus x, mean is the mean of the path minus x. For any p, the end of the path lies on
-   the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain of pi. *pieces_used
-   increases by the number of computed pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges. `change`
+   receives the end of the path minus x, and `mean` the mean of the path minus x. For any p, the end of the
+   path lies on the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain of pi.
+   *pieces_used increases by the number of computed pieces. */
 static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
     const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
     int *pieces_used)

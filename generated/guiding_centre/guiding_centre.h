@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 913829409b5a491a0be3ff3cef9db5300264e0d913fd8524dc30154cf2344d67
+ * body-sha256: 20639698bdbbbba4f9d43f95176c26754daba97f31aecc6674075f9905e73f8c
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -34,7 +34,7 @@ typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_cen
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
+/* Predictor, which affects the speed only: the last solution and backward differences, for extrapolation. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -65,12 +65,12 @@ size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: faa416f572647fb62257582f02e1ca44cd51688ebd670db3081bbee4dadda255
+# body-sha256: 4a44afda91cfc127a7defcfb996597e8c7a950c2f35bdab41437838937a03fed
 import numpy as np
 
 VERSION = "0.1.0"
@@ -185,7 +185,7 @@ PATIENCE = 3  # number of iterations before the approximate Jacobian may be repl
 NEGLIGIBLE = 1e-17  # a Taylor series ends if its terms are below this fraction of the size of the path
 LEAST_SHARE = 1e-5  # size of a path m in coordinate i: |m_i| + this times the sum of all |m_j|
 ROUNDED_SLOPE = 2e-15  # tolerated error of dm/dt at the end m of a path, relative to |m| + |dm/dt|
-DIFFERENCE = 1e-7  # step of difference quotients, relative to p: about the square root of its rounding errors
+DIFFERENCE = 1e-7  # step of difference quotients, relative to p: about the square root of the rounding error
 SOLVED = 4e-16  # iterations end if the residual is below this, relative to p
 NEARLY_SOLVED = 1e-12  # after a residual below this, slow iterations end
 SHRINKING = 0.25  # iterations are slow if a residual exceeds this fraction of the one before
@@ -275,7 +275,7 @@ def _power(a, b, r, k):
 
 
 def _piece(coef, p, start):
-    """Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m = start, by its Taylor series.
+    """Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m(0) = `start`, by its Taylor series.
 
     Arrays have the shape (members, DIM). Returns m(1) - start, the mean of m(t) - start, and for which members
     30 terms of the series sufficed.
@@ -470,7 +470,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):
@@ -590,7 +590,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
+    """Return `value` for each member of x, as an array (members,). A single number is returned unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 5d3142d24747cd1111ff2b4856916dbde06c8c019084d93814a529972dd43ee3
+ * body-sha256: 2e959abc1c4f55fce777dc22911edc03a5acd2aaed8a65349bb7f4b28a0270bf
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -149,7 +149,7 @@ static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrd
     }
 }
 
-/* Store the offsets of all rows and their neighbours in memory, for s->lines. */
+/* Store the offsets of all rows and of their neighbours in `memory`; s->lines points to them. */
 static void heisenberg_find_all_lines(heisenberg_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;
@@ -188,7 +188,7 @@ static inline double heisenberg_sin_lane(double u)
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
     const double reduced = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = reduced - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* bits of shifted; the last bit is the parity of k */
+    uint64_t parity, bits; /* bits of `shifted`; the last bit is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -604,7 +604,7 @@ static void heisenberg_take(const heisenberg_solver *s, double *const *fields, d
                 (size_t)s->length * sizeof *x);
 }
 
-/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
+/* Store a parameter at all sites: the array `values`, or `value` at each site if `values` is NULL. */
 static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, const double *values,
     double value)
 {
@@ -711,7 +711,7 @@ static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const do
 /* A flow to apply: the part of H, and the coefficients of its flow. */
 typedef struct {
     int part;           /* the part of H */
-    const double *coef; /* its coefficients */
+    const double *coef; /* coefficients of the flow */
 } heisenberg_flow;
 
 /* Set *flow to flow `number` of the step that follows `steps` steps; number heisenberg_FLOWS is the last flow

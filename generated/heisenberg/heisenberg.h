@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7719b8d5f75b2163c39ddc278191b0fa4db3595113661e5244eb7fcc11c47415
+ * body-sha256: 72090d2918c7898042eb07435f67f6b441ee45864551318c2c0854ea3e467bca
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -54,7 +54,7 @@ typedef struct {
 /* Number of bytes that heisenberg_init needs for these sizes; 0 if they are not admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
-/* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)
+/* Initialise *s with the state x0[field][site], the last axis fastest. `work` has heisenberg_work_size(sizes)
    bytes, aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are
    copied. Returns heisenberg_BAD_ARGUMENT if sizes are not admissible, a value is not finite, or a parameter
    that must be positive is not. */
@@ -103,12 +103,12 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 typedef struct {
     /* number of planes that are read before the first updated one, and after the last */
     size_t behind, ahead;
-    /* fields read on these planes, and fields that are updated: bit k is 1 for field k */
+    /* bit k of `read`: field k is read beyond the updated planes; bit k of `changed`: field k is updated */
     unsigned long read, changed;
 } heisenberg_stage;
 
 size_t heisenberg_stages(void);
-/* sets *about for stage `number` */
+/* writes to *about what stage `number` reads and updates */
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about);
 
 /* heisenberg_begin computes the coefficients for a step size; call it before the first stage.
@@ -119,8 +119,8 @@ heisenberg_status heisenberg_begin(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int full_range, size_t from,
     size_t to);
 
-/* Read or write the values x[plane][site] of a field, counted from 0, on the planes `from` ... `to` - 1.
-   heisenberg_holds returns 1 if all fields are finite on these planes. */
+/* Read or write the values x[plane][site] of field number `field` on the planes `from` ... `to` - 1. Fields
+   and planes are counted from 0. heisenberg_holds returns 1 if all fields are finite on these planes. */
 heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
     double *x);
 heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size_t from, size_t to,

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: cf1af183d7f5eb454368f61365d060ed3b28ae08d5ecab5710187231754a19c3
+ * body-sha256: b1ba9585681a8216df1e3afa47cbe8189ab97fdfd1f9e6e288be75e0c13ff370
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -86,8 +86,8 @@ static int kepler_eccentric_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
-   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms
+   that are small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *change, const double *rest)
 {
     double x[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
@@ -114,8 +114,8 @@ static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
-/* Add change to coordinate i within a step. displacement is the sum of the compensation term and of the
-   changes so far; x is the rounded sum start + displacement. */
+/* Add `change` to coordinate i within a step. `displacement` is the sum of the compensation term and of the
+   changes so far; x is the rounded sum `start` + `displacement`. */
 static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
     double displacement[kepler_eccentric_DIM], const double start[kepler_eccentric_DIM], int i, double change)
 {
@@ -123,7 +123,7 @@ static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
     x[i] = start[i] + displacement[i];
 }
 
-/* At the end of a step, add displacement to x in compensated arithmetic. */
+/* At the end of a step, add `displacement` to x in compensated arithmetic. */
 static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry[kepler_eccentric_DIM],
     const double displacement[kepler_eccentric_DIM])
 {
@@ -144,7 +144,7 @@ static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, 
     coef[3] = 7.5 * (h * params->oblateness);
 }
 
-/* The flow of the part of K with H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted. */
+/* The flow of log(A + e), A = H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted. */
 static void kepler_eccentric_change1(const double coef[2], const double state[4], double change[4])
 {
     const double p1 = state[2], p2 = state[3];
@@ -167,8 +167,8 @@ static inline void kepler_eccentric_flow1(const double *coef, double x[6], doubl
     kepler_eccentric_add(x, displacement, start, 5, change[3]);
 }
 
-/* The flow of the part of K with H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 +
-   q1**2)))) - (q2**2 + q1**2)**(-1/2): p1, p2 shifted. */
+/* The flow of -log(-B), B = H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 + q1**2))))
+   - (q2**2 + q1**2)**(-1/2): p1, p2 shifted. */
 static void kepler_eccentric_change2(const double coef[4], const double state[4], double change[3])
 {
     const double q1 = state[0], q2 = state[1];

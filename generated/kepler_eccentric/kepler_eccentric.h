@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fd53e5b546bc2cd458e14b380d183c3b3bc83ec5ab5f1b60689430a53d7dfb5f
+ * body-sha256: 43259b2291f8e5f00cfd703d70a6f6be3103d1ec816d22f478e4c9fe1c1c8702
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -66,12 +66,12 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const double gauge[kepler_eccentric_GAUGES]);
 
 /* Make one step or many. Their size h in tau may be negative; s->t increases by their physical time. If a
-   step fails, s->x is the state before it, after s->steps steps. */
+   step fails, s->x and s->steps remain those before this step. */
 kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h);
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   kepler_eccentric_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns kepler_eccentric_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 /* The energy level e becomes -H of the new state, at which kepler_eccentric_monitor must be positive. */
 kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
     const double x[kepler_eccentric_DIM]);

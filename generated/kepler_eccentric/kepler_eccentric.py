@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 86b0462a1705e47fab65127edf06d4a272691007c227f93167c4d96f74598030
+# body-sha256: dbb17f568367fc0a141b5cfe47c0f97872844137fa4c05b05b14a06b9d1d191b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -126,7 +126,7 @@ def _prepare_row(parameters, gauge, h):
 
 
 def _flow1(coef, state):
-    """The flow of the part of K with H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted."""
+    """The flow of log(A + e), A = H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted."""
     p1 = state[..., 2]
     p2 = state[..., 3]
     t1 = coef[0] + (0.5 * (p2 * p2) + 0.5 * (p1 * p1))
@@ -135,8 +135,8 @@ def _flow1(coef, state):
 
 
 def _flow2(coef, state):
-    """The flow of the part of K with H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 -
-    3*(q2**2/(q2**2 + q1**2)))) - (q2**2 + q1**2)**(-1/2): p1, p2 shifted."""
+    """The flow of -log(-B), B = H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 +
+    q1**2)))) - (q2**2 + q1**2)**(-1/2): p1, p2 shifted."""
     q1 = state[..., 0]
     q2 = state[..., 1]
     t1 = q2 * q2
@@ -247,7 +247,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
+    """Return `value` for each member of x, as an array (members,). A single number is returned unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """

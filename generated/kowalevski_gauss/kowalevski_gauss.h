@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d3b97bcfdc04335b1a4a0d0635fe7f4bbb6e552812ef0a3d2f3e4999c3a093a9
+ * body-sha256: a2071212efaae3115e83cfdb2ae8c4e6302afd56bba20e3229cab539d26c8c1a
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -37,8 +37,8 @@ const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* t
 /* Results of the last steps, from which the starting values of the next iteration are predicted. They affect
    the speed only. Unknowns are offsets from a state, called their frame. A sweep iterates all stages once. */
 typedef struct {
-    int count;     /* number of steps in the array increments */
-    int latest;    /* index of the last step in the array increments */
+    int count;     /* number of steps in the array `increments` */
+    int latest;    /* index of the last step in the array `increments` */
     int sweeps;    /* number of the first sweep whose change is measured */
     int predictor; /* index in kowalevski_gauss_prediction of the predictor for the next step */
     /* steps since the predictors were first compared; they are compared again after every
@@ -73,12 +73,12 @@ size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s);
 kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     const kowalevski_gauss_params *params, const double x0[kowalevski_gauss_DIM]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 kowalevski_gauss_status kowalevski_gauss_step(kowalevski_gauss_solver *s, double h);
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   kowalevski_gauss_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns kowalevski_gauss_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 kowalevski_gauss_status kowalevski_gauss_set_state(kowalevski_gauss_solver *s,
     const double x[kowalevski_gauss_DIM]);
 kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
@@ -99,9 +99,9 @@ kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params 
 
 /* As kowalevski_gauss_ensemble, for members with separate parameters params[m] and step sizes h[m]. params
    may be NULL for the defaults. */
-/* frames, if not NULL, receives the states after every stride-th step: frames[(k * kowalevski_gauss_DIM + i)
-   * members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
-   Arrays must not overlap. */
+/* `frames`, if not NULL, receives the states after every stride-th step: frames[(k * kowalevski_gauss_DIM +
+   i) * members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed
+   before. Arrays must not overlap. */
 kowalevski_gauss_status kowalevski_gauss_ensemble_each(const kowalevski_gauss_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
 

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 10eebe127f544f732d2d1ffdb7e53280cc729c6938403a958fb951b689a37e87
+ * body-sha256: f61da38ede339e4720065bdc2a12cad51dad6f0af30c74e2b1f9404dc8ae80ce
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -65,8 +65,8 @@ static int pendulum_euler_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
-   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms
+   that are small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change, const double *rest)
 {
     double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 97235bd52e24686068ff9f09ccad452187fbe71f5785245985d2042411ca2379
+ * body-sha256: 6cf1a217351d184df1a8f8847deaf637c2316c64b77db3c6bc8106a2395a2eb2
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -51,12 +51,12 @@ size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   pendulum_euler_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns pendulum_euler_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 

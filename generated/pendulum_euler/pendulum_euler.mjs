@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ab9d735465453d55d7610b4c655387f684a3f98302436779357638732f244ba5
+ * body-sha256: 93e1745ce966689066df05a03e7b1a20f73aedbbd1f3bc005dfa56eb7826b519
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -125,7 +125,7 @@ function finite(values, length, what) {
 
 // ---- Many steps ----
 
-/** Make `count` steps of a solver. Throws StepError if a step fails, or if count is not an integer >= 0. */
+/** Make `count` steps of a solver. Throws StepError if a step fails, or if `count` is not an integer >= 0. */
 function march(solver, h, count, makeStep = () => solver.step(h)) {
   if (!(Number.isInteger(count) && count >= 0)) {
     throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}, not 0, 1, 2, …`);
@@ -440,8 +440,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small contains the compensation term, and other
- * terms that are much smaller than change.
+ * Add `change` + `small` to the state by compensated summation. `small` contains the compensation term, and
+ * other terms that are much smaller than `change`.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

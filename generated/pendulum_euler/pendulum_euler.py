@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 587d1bd7264a159f5e224f6a24509e70bca5baf95e5b4d3e73abe316958a3600
+# body-sha256: b9b837dd791f0a8f20a782bd67edd1ea93bef86aad0bc943646b94a898f4b27a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -171,7 +171,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
+    """Return `value` for each member of x, as an array (members,). A single number is returned unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 443f03a6b9986e1195b4265ca54f8321cd75fef5f7ddbbc333a816380911b53b
+ * body-sha256: 79001c612016cf7a4b115c4ea0d58da7185c38e3b9e9bed89ffd511922477475
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -60,7 +60,7 @@ typedef struct {
     const point_vortices_solver *s;
     double *const *x;                  /* fields and parameters, as in point_vortices_solver */
     ptrdiff_t from, to;                /* first site of the segment, and the one after the last */
-    double *const *start, *const *out; /* start of a stage, and the result; x is its solution y */
+    double *const *start, *const *out; /* state before a stage, and the result; x holds the solution y */
     double *const *varied;             /* tangent vector: a variation of x */
 } point_vortices_row;
 
@@ -113,7 +113,7 @@ static inline point_vortices_row point_vortices_piece_of(const point_vortices_so
     return row;
 }
 
-/* For each site a, the sum of the forces by all other sites b. */
+/* For each site a, the forces on a, summed over all other sites b. */
 static inline void point_vortices_pair_forces(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
@@ -151,7 +151,7 @@ static inline void point_vortices_pair_energy(const point_vortices_row *row)
     }
 }
 
-/* For each site a, the sum of the forces by all other sites b, and of their variations. */
+/* For each site a, the forces on a and their variations, summed over all other sites b. */
 static inline void point_vortices_pair_slopes(const point_vortices_row *row)
 {
     const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1];
@@ -188,7 +188,7 @@ static inline void point_vortices_pair_slopes(const point_vortices_row *row)
     }
 }
 
-/* At each site, one fixed-point iteration for y, from x. */
+/* At each site, one fixed-point iteration for the solution y of a stage that starts at x. */
 static inline void point_vortices_relax(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -317,7 +317,7 @@ static void point_vortices_take(const point_vortices_solver *s, double *const *f
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
+/* Store a parameter at all sites: the array `values`, or `value` at each site if `values` is NULL. */
 static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
     double value)
 {
@@ -426,7 +426,7 @@ enum {
 #define point_vortices_SLOW 0.6
 #define point_vortices_NEARLY_SETTLED 0x1p-30 /* Newton's method does not take over at changes below this */
 
-/* number of partial results in reductions over sites, so that these loops vectorise */
+/* number of partial results in a reduction over sites; with a single result, the loop would not vectorise */
 enum { point_vortices_WIDTH = 32 };
 
 static inline void point_vortices_raise(double *largest, double value)
@@ -486,7 +486,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     return largest_change;
 }
 
-/* Predict the solution of a stage: s->y[0] = x + (extrapolation of past y - x), with the halo. */
+/* Predict the solution of a stage, with the halo: s->y[0] = x + (y - x extrapolated from earlier steps). */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_EACH_PIECE
@@ -548,7 +548,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 /* ---- Krylov spaces ---- */
 #define point_vortices_SOLVED 1e-6 /* GMRES for a Newton correction ends at this relative residual */
 #define point_vortices_USEFUL 0.9  /* largest relative residual of an accepted correction */
-/* largest accepted |y - x| of a solution y, relative to |x| + |change of y = x by one sweep| */
+/* largest accepted |y - x| / (|x| + |z - x|) of a solution y; one sweep from x gives z */
 #define point_vortices_PLAUSIBLE 1.5
 
 /* Scalar product of x and y, each field divided by its usual size. Sums of row segments are added in order,
@@ -576,7 +576,7 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
     return sum;
 }
 
-/* Compute to = a x + b y at all sites, and the halo of `to`. */
+/* Compute `to` = a x + b y at all sites, and the halo of `to`. */
 static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double a,
     double *const *x, double b, double *const *y)
 {
@@ -593,7 +593,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* Compute to = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. */
+/* Compute `to` = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. */
 static void point_vortices_multiply(const point_vortices_solver *s, const double *coef, int now,
     double *const *v, double *const *to)
 {
@@ -603,8 +603,8 @@ static void point_vortices_multiply(const point_vortices_solver *s, const double
     point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
-/* Compute to = from - v, where v solves A v = s->space[0] and point_vortices_multiply multiplies by A. The
-   method is GMRES (Y. Saad and M. H. Schultz) with point_vortices_DIRECTIONS directions, without restart.
+/* Compute `to` = `from` - v, where v solves A v = s->space[0] and point_vortices_multiply multiplies by A.
+   The method is GMRES (Y. Saad and M. H. Schultz) with point_vortices_DIRECTIONS directions, without restart.
    Returns the norm of s->space[0], or infinity if the residual is too large for v to be useful. */
 static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
@@ -649,7 +649,7 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
 }
 
 /* ---- Newton's method, for stages that fixed-point sweeps do not solve ---- */
-/* The sum of |y - x| + added |x| over all fields and sites, for y = s->y[side]. */
+/* The sum of |y - x| + `added` * |x| over all fields and sites, for y = s->y[side]. */
 static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -680,8 +680,8 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
 }
 
 /* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now].
-   The method is fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther from x than
-   `range` are then refused. */
+   Iterate by fixed-point sweeps or, if s->stiff, by Newton's method. Newton's method fails for solutions
+   farther from x than `range`. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
     int *now)
 {
@@ -695,7 +695,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* stop at rounding level, or if further sweeps would change too little at the rate change / before */
+        /* stop at rounding level, or if the sum of all further changes, change^2 / shrunk, is negligible */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
             && change <= point_vortices_ROUNDING && count > 0))
             return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bd928ed0acead0fe961c08f9b386caf0dacf86b593c19f4b858d145145e26c76
+ * body-sha256: 9eb229b8ab9e2e2ce713ebd678bbb2f9b657821303a30ca7ef0b20149d07ed1a
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -22,12 +22,12 @@ typedef struct {
 
 extern const point_vortices_params point_vortices_default_params;
 
-enum { point_vortices_ARRAYS = 3 }; /* number of arrays over sites: fields, parameters */
+enum { point_vortices_ARRAYS = 3 };       /* number of arrays over sites: fields, parameters */
 enum { point_vortices_COEFFICIENTS = 5 }; /* number of coefficients: functions of params and h */
-enum { point_vortices_STAGES = 5 }; /* number of stages of a step */
-enum { point_vortices_DIRECTIONS = 24 }; /* largest dimension of a Krylov space of Newton's method */
-enum { point_vortices_DIFFERENCES = 2 }; /* number of differences in the predictor of a stage */
-enum { point_vortices_GATHERED = 4 }; /* number of sums over bonds or pairs that are stored for each site */
+enum { point_vortices_STAGES = 5 };       /* number of stages of a step */
+enum { point_vortices_DIRECTIONS = 24 };  /* largest dimension of a Krylov space of Newton's method */
+enum { point_vortices_DIFFERENCES = 2 };  /* number of differences in the predictor of a stage */
+enum { point_vortices_GATHERED = 4 };     /* for each site, number of stored sums over its bonds or pairs */
 
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
     point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
@@ -71,7 +71,7 @@ typedef struct {
 /* Number of bytes that point_vortices_init needs for these sizes; 0 if they are not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
-/* Initialise *s with the state x0[field][site], the last axis fastest. work has
+/* Initialise *s with the state x0[field][site], the last axis fastest. `work` has
    point_vortices_work_size(sizes) bytes, aligned as by malloc, and must outlive *s. params must not be NULL,
    nor those of its arrays that have no default; all arrays are copied. Returns point_vortices_BAD_ARGUMENT if
    sizes are not admissible, params or a required array is NULL, a value is not finite, or a parameter that

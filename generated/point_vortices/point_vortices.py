@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c20c01bdab22c3a0459a30c23736885b8b4c31b096e28fb9f3000ce7a0944bfa
+# body-sha256: a618890d0bb8534f644b4ab6b6c2aa59ef4300676c33205b7f249259eb401a20
 import numpy as np
 
 VERSION = "0.1.0"
@@ -200,7 +200,7 @@ def _advance(sites, rows, x, past):
 DIRECTIONS = 24  # dimension of the Krylov space in which a correction is computed
 SOLVED = 1e-6  # GMRES for a Newton correction ends at this relative residual
 USEFUL = 0.9  # largest relative residual of an accepted correction
-PLAUSIBLE = 1.5  # largest accepted |y - x| of a solution y, relative to |x| + |change of y = x by one sweep|
+PLAUSIBLE = 1.5  # largest accepted |y - x| / (|x| + |z - x|) of a solution y; one sweep from x gives z
 
 
 def _middle(coef, x, prediction, sites, past):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 1a58e656f65ad4525b5c429a981580b4655fb5d7d881f6a7bc692b1d50c5f3e7
+ * body-sha256: 70d08ae7caa3884fc5af1d351fd932ca9db17d1369962dbfb701eb60b897a88c
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -113,8 +113,8 @@ static int predator_prey_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are
-   small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms
+   that are small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int predator_prey_advance(predator_prey_solver *s, const double *change, const double *rest)
 {
     double x[predator_prey_DIM], carry[predator_prey_DIM];
@@ -130,7 +130,7 @@ static int predator_prey_advance(predator_prey_solver *s, const double *change, 
     return 1;
 }
 
-/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
+/* Solve `matrix` * x = `side` by elimination with pivoting; `side` receives x. Returns 0 if singular. */
 static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_DIM],
     double side[predator_prey_DIM])
 {
@@ -203,7 +203,7 @@ static void predator_prey_remember(predator_prey_history *history, const double 
 }
 
 #define predator_prey_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* longer steps may change the energy by at most this fraction */
+#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

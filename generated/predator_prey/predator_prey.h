@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0d1b334d9179b617b9413fd114dd6ec859eb4ef244dbcd461c1404a1877743d5
+ * body-sha256: c63110579fa48aedbb7d002aefda0ca2aae7538900babcc70c1f8b6b459ae8d3
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -34,7 +34,7 @@ typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
+/* Predictor, which affects the speed only: the last solution and backward differences, for extrapolation. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -63,12 +63,12 @@ size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 

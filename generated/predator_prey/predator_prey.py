@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3354934b9e5cc2391fad21fbf6e14aa98d3f3967988e2083f4268163f0354bb7
+# body-sha256: 189e78ee347cb8d43f13df46cc0665aeaecbc1f8eac10209cfb7a8032d213004
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,7 +209,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # longer steps may change the energy by at most this fraction
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):
@@ -244,7 +244,7 @@ SHRINKING = 0.25  # iterations are slow if a correction exceeds this fraction of
 def _size(y, delta):
     """Return the relative size of the correction delta of y for each member.
 
-    It is the largest ratio of |delta_i| to |y_i| + FLOOR times the largest |y_j|.
+    It is the largest |delta_i| / (|y_i| + FLOOR max_j |y_j|).
     """
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
@@ -338,7 +338,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return an array with one number for each member of x as an array (members,); a single number is unchanged.
+    """Return `value` for each member of x, as an array (members,). A single number is returned unchanged.
 
     Raises ValueError if the shape of the array does not fit the leading axes of x.
     """

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: df20162c88bd09bc81241cc5353476985a5a1fa44b912d956163766bb6fccb4f
+ * body-sha256: 4253665dde88a1ee93f3ef0a6357235f8a778741a3ba37daf71442782817d5e0
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -36,7 +36,7 @@ typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and backward differences, for extrapolation. It affects the speed only. */
+/* Predictor, which affects the speed only: the last solution and backward differences, for extrapolation. */
 typedef struct {
     int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
     /* the last solution, then its differences */
@@ -70,12 +70,12 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 quaternion_top_status quaternion_top_step(quaternion_top_solver *s, double h);
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4d5305da1900c46b5a3b80d39be4bcb81437800fc3ace32d56833fe7793516e9
+ * body-sha256: b51dccd23c92cd7830363fc7913e2bfdff6e99ba1b7e8cd76f0ae9506794f76c
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -38,11 +38,11 @@ const char *rigid_body_status_string(rigid_body_status status); /* the meaning o
 
 enum { rigid_body_STORED_VALUES = 2 * rigid_body_REMEMBERED };
 
-/* Predictor: recent solutions of the implicit equation. They give the starting value of the next iteration by
-   extrapolation, or by a linear recurrence that is fitted to the last rigid_body_REMEMBERED solutions. It
-   affects the speed only. */
+/* Predictor, which affects the speed only: recent solutions of the implicit equation. They give the starting
+   value of the next iteration by extrapolation, or by a linear recurrence that is fitted to the last
+   rigid_body_REMEMBERED solutions. */
 typedef struct {
-    int count; /* number of solutions in past */
+    int count; /* number of solutions in the array `past` */
     int extrapolation_order; /* number of solutions that the extrapolation uses */
     int recurrence_terms; /* number of solutions that the recurrence uses; 0 if none is fitted */
     int use_recurrence; /* 1 if the recurrence predicts better than the extrapolation */
@@ -96,12 +96,12 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   rigid_body_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns rigid_body_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
 
@@ -119,7 +119,7 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
 /* As rigid_body_ensemble, for members with parameters params[m], step size h[m], and gauge: gauge[m *
    rigid_body_GAUGES + k] times Casimir k is subtracted from H. params may be NULL for the defaults, gauge for
    factors chosen at the initial states. */
-/* frames, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
+/* `frames`, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
    members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,

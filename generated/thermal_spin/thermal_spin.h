@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 402d844f0c1459c581aa95ae0f2ed53a265bfac2c999b139aa7899489941bc13
+ * body-sha256: dd772ad3180d3c0989838ff17612dfed1ef4060261bc25b89c08c71bccd77a25
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -49,7 +49,7 @@ typedef struct {
     size_t steps; /* number of successful steps since thermal_spin_init */
     size_t evaluations; /* number of evaluations of the generating function, for statistics */
     double t; /* time since thermal_spin_init */
-    uint64_t seed, first_step; /* with member, these select the random numbers: see thermal_spin_set_noise */
+    uint64_t seed, first_step; /* select, with `member`, the random numbers: see thermal_spin_set_noise */
     uint32_t member;
     double dw[thermal_spin_DRAWS]; /* increments of the noise in the last step */
     double h; /* size of the last step; NaN before the first step */
@@ -72,12 +72,12 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
 thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h);
 thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
-   thermal_spin_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change.
+   Returns thermal_spin_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM]);
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM]);
 

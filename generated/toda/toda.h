@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6c8c84552420295e423471a7c9da05975ddd8320e20120044efe094398676134
+ * body-sha256: 252f0789e73ae9c9c0ba97bd2c3f8a65063b6b5fa1032ae88c980151b8f9fc8e
  */
 #ifndef TODA_H
 #define TODA_H
@@ -52,10 +52,10 @@ typedef struct {
 /* Number of bytes that toda_init needs for these sizes; 0 if they are not admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
-/* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,
-   aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are copied.
-   Returns toda_BAD_ARGUMENT if sizes are not admissible, a value is not finite, or a parameter that must be
-   positive is not. */
+/* Initialise *s with the state x0[field][site], the last axis fastest. `work` has toda_work_size(sizes)
+   bytes, aligned as by malloc, and must outlive *s. params may be NULL for the defaults; its arrays are
+   copied. Returns toda_BAD_ARGUMENT if sizes are not admissible, a value is not finite, or a parameter that
+   must be positive is not. */
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
     const double *x0, void *work);
 

@@ -119,7 +119,7 @@ class SeriesPlan:
         relax = site_kernel(
             cell,
             "relax",
-            "at each site, one fixed-point iteration for y, from x",
+            "at each site, one fixed-point iteration for the solution y of a stage that starts at x",
             values[:size],
             "y",
             coefficients,

@@ -41,6 +41,7 @@ from phigen.lattice.site_transposes import transposed
 from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
+from phigen.scheme.bond_ends import ONE_END
 from phigen.scheme.choosing import ScheduledMethod, is_dated, planned, with_carrier
 from phigen.scheme.forces import forced_lines
 from phigen.scheme.gathering import staged
@@ -120,7 +121,7 @@ class SplittingPlan:
         if count == 1 and not coloured_parts:
             return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
         parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
-        reason = f", since {choice.why}" if choice.why else ""
+        reason = f"; chosen since {choice.why}" if choice.why else ""
         schedule = choice.schedule() if not coloured_parts else None
         further = f", {len(schedule.begin)} more before and after a run" if schedule and schedule.begin else ""
         flows = (
@@ -453,7 +454,7 @@ def _sweep(
     location = f" on the seam {flow.window}" if flow.window else " near seams" if near_seam else ""
     purpose = f"the flow of {hamiltonian}{location}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
-    purpose = f"for each site a, the sum of the forces of H_{k} by {_others(cell)} b"
+    purpose = f"for each site a, the forces of H_{k} on a, summed over {_others(cell)} b"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients, late=late) if tangent else None
     omits_seams, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
@@ -473,7 +474,7 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
     kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)
     sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
-    purpose = f"for each site a, the sums of the forces by {_others(cell)} b, and of their variations"
+    purpose = f"for each site a, the forces on a and their variations, summed over {_others(cell)} b"
     return Sweep(kernel, updated, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
 
 
@@ -492,7 +493,7 @@ def _gather(
         values = list(s.values.values())
         values = coefficients.hoist(values) if coefficients else values
         verb = {"a": "begin", "b": "end"}.get(s.end)
-        suffix, condition = (f"_{s.end}", f", for bonds that {verb} at a") if verb else ("", "")
+        suffix, condition = (f"_{s.end}", f"{ONE_END} {verb} at a") if verb else ("", "")
         ends.append(
             Ends(
                 site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients, Role.GATHER),
@@ -518,14 +519,15 @@ def _partners(cell: Cell, *, varied: bool) -> Partners | None:
         return None
     kind = "bond" if cell.relation == GRAPH else "pair"
     empty, sums = Gather((), ()), site_sums(cell)
-    purpose = f"for each site a, the sum of the forces by {_others(cell)} b"
+    forces = f"for each site a, the forces on a, summed over {_others(cell)} b"
+    slopes = f"for each site a, the forces on a and their variations, summed over {_others(cell)} b"
     varied_sums = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
     return Partners(
         _gather(cell, energies(cell), f"{kind}_energy", f"for each site a, the sum of the energies of its {kind}s")
         or empty,
-        _gather(cell, sums, f"{kind}_forces", purpose) or empty,
+        _gather(cell, sums, f"{kind}_forces", forces) or empty,
         cell.relation == GRAPH,
-        _gather(cell, varied_sums, f"{kind}_slopes", f"{purpose}, and of their variations") or empty,
+        _gather(cell, varied_sums, f"{kind}_slopes", slopes) or empty,
         _gather(cell, observed_sums(cell), f"{kind}_quantities", f"the densities of observables of a {kind}") or empty,
     )
 

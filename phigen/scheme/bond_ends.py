@@ -11,6 +11,9 @@ from phigen.scheme.steps import Ends, Gather
 from phigen.symbolic.expression import substitute, symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
+#: Words between the purpose of a kernel and the condition on the bonds to which it applies, such as "begin at a".
+ONE_END = "; only for bonds that"
+
 
 def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
     """Return the loops over the bonds of a site, each with the parameters whose sign is opposite at the end b.
@@ -29,7 +32,7 @@ def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
         differences = [("", a - b) for a, b in zip(first.kernel.roots, values_at_other_end, strict=True)]
         if decide_zero("", differences).verdict == PROVED:
             name = first.kernel.name.removesuffix(f"_{first.end}")
-            purpose = first.kernel.purpose.partition(", by bonds that ")[0]
+            purpose = first.kernel.purpose.partition(ONE_END)[0]
             kernel = replace(first.kernel, name=name, purpose=purpose)
             return [(replace(first, kernel=kernel, end=""), frozenset(opposite))]
     return apart

@@ -75,8 +75,10 @@ class Gauge:
     @property
     def facts(self) -> list[str]:
         """The lines about the gauge in the header of generated files."""
-        names = f"{'multiples' if len(self.free) > 1 else 'a multiple'} of {', '.join(self.free)}"
-        lines = [f"gauge: {self.letter} minus {names}, chosen at the start of each trajectory"]
+        several = len(self.free) > 1
+        names = f"{'multiples of the Casimirs' if several else 'a multiple of the Casimir'} {', '.join(self.free)}"
+        factors = "the factors are" if several else "the factor is"
+        lines = [f"gauge: {self.letter} minus {names}; {factors} chosen at the start of each trajectory"]
         terms = " - ".join(f"({value}) {name}" for name, value in self.fixed.items())
         fixed = [f"gauge: {self.letter} - {terms} in place of {self.letter}"] if terms else []
         return (lines if self.free else []) + fixed + self.notes

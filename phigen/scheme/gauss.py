@@ -269,12 +269,14 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
         yield "structure: to truncation; a step is not a Poisson map, and conserves Casimirs of degree 1 and 2 only"
     elif realisation.groups:
         group_names = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
-        yield f"structure: exact, a step is a Poisson map, by quadratic momentum maps for {group_names}"
+        form = "form quadratic momentum maps" if len(realisation.groups) > 1 else "form a quadratic momentum map"
+        yield f"structure: exact; a step is a Poisson map, since {group_names} {form}"
     elif realisation.logarithms:
         group_names = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
-        yield f"structure: exact, a step is a Poisson map; brackets are constant with the logarithms of {group_names}"
+        reason = f"brackets are constant with the logarithms of {group_names}"
+        yield f"structure: exact; a step is a Poisson map, since {reason}"
     else:
-        yield "structure: exact, a step is a Poisson map, since the brackets are constant"
+        yield "structure: exact; a step is a Poisson map, since the brackets are constant"
     yield from gauge.facts
     yield from monitor_facts(gauge.monitor, forced=system.forces is not None)
     vector = " + f" * has_vector_force(system)

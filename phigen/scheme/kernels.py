@@ -155,10 +155,10 @@ def full(n: int) -> Pattern:
 def _elimination_kernel(pattern: Pattern, *, transposed: bool = False) -> Kernel:
     n = len(pattern)
     solution, reciprocals = transposed_elimination(pattern) if transposed else elimination(pattern)
-    which = "(transposed matrix)" if transposed else "matrix"
+    which = "(transposed `matrix`)" if transposed else "`matrix`"
     return Kernel(
         "eliminate_transposed" if transposed else "eliminate",
-        f"solve {which} * solution = side by elimination without pivoting; reciprocal: 1 / the pivots",
+        f"solve {which} * `solution` = `side` by elimination without pivoting; `reciprocal` receives 1 / pivots",
         {"matrix": _entries("J", n), "side": tuple(Symbol("r", i) for i in range(n))},
         (Output("solution", tuple(solution)), Output("reciprocal", reciprocals)),
     )
@@ -209,7 +209,8 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
         ]
     return Kernel(
         "invert",
-        "the inverse of matrix by elimination without pivoting; gain: slope * inverse; reciprocal: 1 / the pivots",
+        "compute the `inverse` of `matrix` by elimination without pivoting, `gain` = `slope` * `inverse`, and"
+        " `reciprocal` = 1 / pivots",
         {"matrix": _entries("J", n), "slope": _entries("K", n)},
         (Output("inverse", tuple(entries)), Output("gain", tuple(gain)), Output("reciprocal", tuple(reciprocals))),
     )

@@ -55,6 +55,12 @@ class Logarithmic:
         """Return how long the flow of A or of B runs in a step over τ: τ/(A + e) for A, τ/(−B) for B."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
+    def part(self, flow: Flow) -> str:
+        """Return the part of K = log(A + e) − log(−B) that belongs to the flow of A or of B, as text that ends with A
+        or B.
+        """
+        return "-log(-B), B" if self._is_negative(flow) else "log(A + e), A"
+
     def _argument(self, flow: Flow) -> Expression:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 

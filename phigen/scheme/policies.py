@@ -89,7 +89,8 @@ class PathPolicy(Policy):
     least_share: float = number(1e-5, "size of a path m in coordinate i: |m_i| + this times the sum of all |m_j|")
     rounded_slope: float = number(2e-15, "tolerated error of dm/dt at the end m of a path, relative to |m| + |dm/dt|")
     difference: float = number(
-        1e-7, "step of difference quotients, relative to p: about the square root of its rounding errors"
+        1e-7,
+        "step of difference quotients, relative to p: about the square root of the rounding error",
     )
     solved: float = number(4e-16, "iterations end if the residual is below this, relative to p")
     nearly_solved: float = number(1e-12, "after a residual below this, slow iterations end")
@@ -138,7 +139,7 @@ class PlausibilityPolicy(Policy):
     """
 
     plausible: float = number(1.5, "accepted length of a step, relative to |x| + |h dx/dt|")
-    max_energy_change: float = number(0.5, "longer steps may change the energy by at most this fraction")
+    max_energy_change: float = number(0.5, "largest relative energy change of steps beyond PLAUSIBLE")
 
 
 @dataclass(frozen=True)
@@ -233,7 +234,7 @@ class LatticeNewtonPolicy(Policy):
     solved: float = number(1e-6, "GMRES for a Newton correction ends at this relative residual")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(
-        1.5, "largest accepted |y - x| of a solution y, relative to |x| + |change of y = x by one sweep|"
+        1.5, "largest accepted |y - x| / (|x| + |z - x|) of a solution y; one sweep from x gives z"
     )
 
 

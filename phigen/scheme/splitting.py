@@ -104,7 +104,7 @@ def build_splitting(
 
 def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
     increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
-    part = "the part of K with " * bool(monitor)
+    part = f"{monitor.part(flow)} = " if monitor else ""
     return Kernel(
         f"flow{k}",
         f"the flow of {part}{_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),

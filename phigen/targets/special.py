@@ -32,7 +32,7 @@ MOST_HALVINGS = 14
 MOST_MEANS = 16
 
 _MEANING = (
-    "(1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it.",
+    "(1 - w cot w)/s with w = sqrt(s)/2; for s < 0, (1 - w coth w)/s with w = sqrt(-s)/2.",
     "The derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
     "The second derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
 )

@@ -87,7 +87,7 @@ STATE = (
         "noise",
         "NOISE",
         (
-            "uint64_t seed, first_step; /* with member, these select the random numbers: see phi_set_noise */",
+            "uint64_t seed, first_step; /* select, with `member`, the random numbers: see phi_set_noise */",
             "uint32_t member;",
             "double dw[PHI_DRAWS];  /* increments of the noise in the last step */",
         ),

@@ -76,6 +76,9 @@ def test_short_code_with_transposes_has_no_function_that_nothing_calls(path: Pat
 
 def test_bonds_that_differ_in_direction_and_parameters_are_added_up_by_one_loop() -> None:
     compilation = compile_spec(load(resources.bundled_specs() / "lattices/chiral_magnet.yaml"), profile="small")
+    code = emit(compilation.program, "c", "phigen")["chiral_magnet.c"]
+    assert "/* For each site a, the forces of H_1, H_5 on a, summed over its neighbours b. */" in code
+    assert "only for bonds that" not in code
     random = np.random.default_rng(2)
     bonds = {"bonds": np.stack([np.arange(20), (np.arange(20) * 7 + 3) % 20], axis=1)[random.permutation(19)]}
     bonds |= {"Dx": random.normal(size=19), "Dy": random.normal(size=19)}

@@ -348,7 +348,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
             (
                 "PASSES",
                 passes,
-                "number of iterations of a block of steps that cost, per step, as much as one evaluation",
+                "for each step in a block, an iteration takes the time of one evaluation divided by this number",
             )
         )
         if lanes.factors:

@@ -68,7 +68,7 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
         (
             "PLAIN",
             step.plain,
-            "number of unknowns with changes relative to |x|; they come first",
+            "changes of the first PLAIN unknowns are relative to |x|",
         ),
         (
             "POINT",

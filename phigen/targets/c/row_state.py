@@ -85,7 +85,7 @@ LATTICE = (
     StateBlock(
         "at_bonds",
         "GRAPH && BOND_PARAMETERS",
-        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */",),
+        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each entry of `other`, the parameters at the bond */",),
     ),
     StateBlock(
         "colours",
@@ -319,7 +319,7 @@ ROW = (
     StateBlock(
         "stage",
         "SERIES",
-        ("double *const *start, *const *out; /* start of a stage, and the result; x is its solution y */",),
+        ("double *const *start, *const *out; /* state before a stage, and the result; x holds the solution y */",),
         reset=("row.start = row.out = s->x;",),
     ),
     StateBlock(

@@ -210,7 +210,7 @@ FLOW = (
         "part",
         members=(
             "int part;                   /* the part of H */",
-            "const double *coef;         /* its coefficients */",
+            "const double *coef;         /* coefficients of the flow */",
         ),
     ),
     StateBlock(

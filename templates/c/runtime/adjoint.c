@@ -35,8 +35,8 @@ static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, si
 #include "adjoint_tape_gauss.c"
 #include "adjoint_tape_explicit.c"
 
-/* Make steps and write their tape, the data for the reverse pass. rows, if not NULL, receives the states after stride,
-   2 * stride, ... steps and at the end. */
+/* Make steps and write their tape, the data for the reverse pass. `rows`, if not NULL, receives the states after
+   stride, 2 * stride, ... steps and at the end. */
 static phi_status phi_record_run(phi_solver *s, size_t steps, size_t stride, double *rows,
     phi_step_tape *tape)
 {

@@ -21,9 +21,9 @@ typedef struct {
 #include "state_of_traced.h"
 } phi_traced;
 
-/* Solve matrix * solutions = sides by elimination without pivoting: matrices are I + O(h). sides becomes the solutions,
-   matrix is overwritten. sides has the given number of columns. wrong becomes infinite in lanes where a pivot is far
-   from 1. */
+/* Solve `matrix` * X = `sides` by elimination without pivoting: matrices are I + O(h). `sides` receives the solutions
+   X, and `matrix` is overwritten. `count` is the number of columns of `sides`. `wrong` becomes infinite in lanes where
+   a pivot is far from 1. */
 static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_lanes wrong)
 {
     for (int k = 0; k < PHI_DIM; ++k) {

@@ -34,8 +34,8 @@ static int phi_back_holds(const double *coef, const double p[PHI_BACK], const do
     return 1;
 }
 
-/* Integrate a path backward with its cotangents, 0 <= t <= 1, by Taylor series: change is the end minus the start.
-   Returns 0 if PHI_TERMS terms do not suffice. */
+/* Integrate a path backward with its cotangents, 0 <= t <= 1, by Taylor series. `change` receives the end minus the
+   start. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_back_piece(const double *coef, const double p[PHI_BACK], const double start[PHI_BACK],
     double change[PHI_BACK])
 {
@@ -69,9 +69,9 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
     return 0;
 }
 
-/* Integrate a path backward from its end, to compute cotangents of its start, of p and of the coefficients. Given are
-   bar, the cotangents of its end, and mean_bar, those of its mean. The result cotangents has the start of the path,
-   then these cotangents. Returns 0 if the path cannot be followed. */
+/* Integrate a path backward from its end, to compute cotangents of its start, of p and of the coefficients. `bar` and
+   `mean_bar` are the cotangents of its end and of its mean. `cotangents` receives the start of the path, then the
+   cotangents. Returns 0 if the path cannot be followed. */
 static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
     const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double cotangents[PHI_BACK])
 {

@@ -5,8 +5,8 @@
 
 #include "model.h"
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are small
-   compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms that are
+   small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static int phi_advance(phi_solver *s, const double *change, const double *rest)
 {
     double x[PHI_DIM], carry[PHI_DIM];

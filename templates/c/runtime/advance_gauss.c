@@ -2,8 +2,8 @@
 #define PHI_FILE_ADVANCE_GAUSS
 #include "model.h"
 
-/* Add change + rest to x by compensated summation. rest holds the compensation term and other terms that are small
-   compared with change. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add `change` + `rest` to s->x by compensated summation. `rest` holds the compensation term, and other terms that are
+   small compared with `change`. Returns 0, with s->x unchanged, if the sum is not finite. */
 static inline int phi_advance(phi_solver *s, const double *change, const double *rest)
 {
     double x[PHI_DIM], carry[PHI_DIM], zero = 0.0; /* x - x is 0 if x is finite, else NaN */

@@ -14,15 +14,15 @@ PHI_CHAPTER_OF_ALGEBRA
 
 #include "elapsed.c"
 
-/* Add change to coordinate i within a step. displacement is the sum of the compensation term and of the changes so far;
-   x is the rounded sum start + displacement. */
+/* Add `change` to coordinate i within a step. `displacement` is the sum of the compensation term and of the changes so
+   far; x is the rounded sum `start` + `displacement`. */
 static inline void phi_add(double x[PHI_DIM], double displacement[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
     displacement[i] += change;
     x[i] = start[i] + displacement[i];
 }
 
-/* At the end of a step, add displacement to x in compensated arithmetic. */
+/* At the end of a step, add `displacement` to x in compensated arithmetic. */
 static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double displacement[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -39,7 +39,7 @@ static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double di
 #endif
 #include "device_linear.c"
 #if !PHI_DEVICE
-/* Solve matrix * x = side by elimination with pivoting: side becomes x. Returns 0 if matrix is singular. */
+/* Solve `matrix` * x = `side` by elimination with pivoting; `side` receives x. Returns 0 if singular. */
 #if PHI_UNROLLED
 static int phi_solve_pivoting(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 #else
@@ -74,8 +74,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_UNROLLED
-/* Solve matrix * solution = side. side becomes the solution, and matrix is overwritten. The matrix is I + O(h), so
-   elimination needs no pivoting unless a pivot is far from 1. Returns 0 if matrix is singular. */
+/* Solve `matrix` * x = `side`; `side` receives x, and `matrix` is overwritten. The matrix is I + O(h), so elimination
+   needs no pivoting unless a pivot is far from 1. Returns 0 if the matrix is singular. */
 static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
     double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
@@ -89,8 +89,8 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 
 #endif
 #if PHI_NEWTON && PHI_ADJOINT
-/* Solve matrix^T * solution = side. side becomes the solution, and matrix is overwritten. Zeros of matrix^T are at
-   other places than those of matrix, so its elimination is separate code. Returns 0 if matrix is singular. */
+/* Solve M^T x = `side` for the matrix M in `matrix`; `side` receives x, and `matrix` is overwritten. M^T has zeros at
+   other places than M, so its elimination is separate code. Returns 0 if M is singular. */
 static int phi_solve_transposed(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
 #if PHI_UNROLLED_TRANSPOSE

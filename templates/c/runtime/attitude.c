@@ -44,7 +44,8 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
-/* Multiply the attitude by the increments of all stages in a block of steps, in order of time. sequence is overwritten. */
+/* Multiply the attitude by the increments of all stages in a block of steps, in order of time. `sequence` is
+   overwritten. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
     for (; count % 2 == 0; count /= 2) /* products of pairs first, since they do not wait for each other */

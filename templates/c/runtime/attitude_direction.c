@@ -4,7 +4,7 @@
 #include "model.h"
 #include "attitude_quaternions.c"
 
-/* Scale the quaternion 1 + factor so that its product with q has length 1. factor is overwritten. */
+/* Scale the quaternion 1 + factor so that its product with q has length 1. `factor` is overwritten. */
 static inline void phi_normalise(const double q[4], double factor[4])
 {
     const double factor_excess = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])

@@ -25,7 +25,7 @@ static inline void phi_add_identity(double element[PHI_ELEMENT])
 
 #include "attitude_orthogonal.c"
 
-/* Number of times that a matrix must be halved until its norm is at most 1/2; square is the square of its norm. */
+/* Number of times that a matrix must be halved until its norm is at most 1/2; `square` is the square of its norm. */
 static int phi_doublings(double square)
 {
     int doublings = 0;
@@ -52,7 +52,8 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     }
 }
 
-/* Compute the group element of a motion for the time t with a constant rate; element is its difference from the identity. */
+/* Compute the group element of a motion for the time t with a constant rate; `element` is its difference from the
+   identity. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];

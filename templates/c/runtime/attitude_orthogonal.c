@@ -5,7 +5,7 @@
 #include "attitude_matrices.c"
 
 /* Correct the attitude increment 1 + factor so that its product with the nearly orthogonal matrix g is nearer to an
-   orthogonal matrix. factor is overwritten. */
+   orthogonal matrix. `factor` is overwritten. */
 static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };

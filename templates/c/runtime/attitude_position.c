@@ -16,8 +16,8 @@ static void phi_read_position(phi_solver *s) { memcpy(s->position, s->turned + 4
 /* Write the position to out, after the 4 numbers of the attitude. */
 static void phi_put_position(const phi_solver *s, double out[PHI_ELEMENT]) { memcpy(out + 4, s->position, sizeof s->position); }
 
-/* Compute the displacement, the last three numbers of element, by a rotation rate and a velocity that are constant for the
-   time t. speed is the magnitude of the rotation rate, scale is sin(t speed / 2) / speed. */
+/* Compute the displacement, the last three numbers of element, by a rotation rate and a velocity that are constant for
+   the time t. `speed` is the magnitude of the rotation rate, `scale` is sin(t speed / 2) / speed. */
 static inline void phi_uniform_position(const double rate[PHI_RATE], double t, double speed, double scale, double element[PHI_ELEMENT])
 {
     const double *w = rate, *v = rate + 3, reach = speed > 0.0 ? 2.0 * (scale * (1.0 + element[0])) : t;

@@ -46,7 +46,8 @@ static inline void phi_added_right(const double element[PHI_ELEMENT], const doub
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* Compute the group element of a motion for the time t with a constant rate; element is its difference from the identity. */
+/* Compute the group element of a motion for the time t with a constant rate; `element` is its difference from the
+   identity. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])), quarter = 0.25 * (t * speed);
@@ -56,7 +57,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_uniform_position(rate, t, speed, scale, element);
 }
 
-/* Rotate the rate of the gauge rotation into the frame where momenta are constant. element is the attitude as a group
+/* Rotate the rate of the gauge rotation into the frame where momenta are constant. `element` is the attitude as a group
    element. */
 static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
@@ -92,7 +93,8 @@ static void phi_read_attitude(phi_solver *s)
     phi_read_position(s);
 }
 
-/* Divide a quaternion by its length, unless the length is 1 to round-off. size is the magnitude of its largest component. */
+/* Divide a quaternion by its length, unless the length is 1 to round-off. `size` is the magnitude of its largest
+   component. */
 static void phi_make_unit(double quaternion[PHI_ELEMENT], double size)
 {
     double square = 0.0;

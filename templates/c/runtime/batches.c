@@ -37,7 +37,7 @@ typedef struct {
     size_t steps_left[PHI_GROUP]; /* number of steps that the member has still to make */
 } phi_group;
 
-/* Add change to one coordinate within a step, in all lanes: displacement is the sum of the changes so far. */
+/* Add `change` to one coordinate within a step, in all lanes. `displacement` is the sum of the changes so far. */
 static inline void phi_add_lanes(double x[restrict PHI_LANES], double displacement[restrict PHI_LANES],
     const double start[restrict PHI_LANES], const double change[restrict PHI_LANES])
 {
@@ -48,7 +48,8 @@ static inline void phi_add_lanes(double x[restrict PHI_LANES], double displaceme
     }
 }
 
-/* At the end of a step, add the displacement in carry to one coordinate, in all lanes; carry becomes the rounding error. */
+/* At the end of a step, add the displacement in `carry` to one coordinate, in all lanes; `carry` receives the rounding
+   error. */
 static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[restrict PHI_LANES],
     const double start[restrict PHI_LANES])
 {

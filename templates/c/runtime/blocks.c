@@ -87,8 +87,8 @@ static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_D
     phi_make_per_tau(&s->params, x, slope);
 }
 
-/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step; mean receives the increment
-   divided by h. */
+/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step; `mean` receives the
+   increment divided by h. */
 static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, double x[PHI_DIM], double mean[PHI_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
@@ -125,8 +125,8 @@ static int phi_predict_block(phi_solver *s, phi_table *table, phi_model *model)
 #include "blocks_attitude.c"
 
 /* Make PHI_LANES steps at once: predict the solutions of all, and correct them together until the remaining error is as
-   small as after a single step. Returns the number of iterations. If more than `most` would be needed, it returns 0, and
-   the state is unchanged. */
+   small as after a single step. Returns the number of iterations, at most `most`. On failure, returns 0 and leaves the
+   state unchanged. */
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_model PHI_OF(model, PHI_STAGES);
@@ -173,7 +173,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps in blocks that repay the fits; also the number of steps without recurrences after they first failed */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* recurrences are fitted if this number of steps follows; also, number of steps without recurrences after their first failure */
     PHI_MOST_SINGLE_STEPS = 1000,     /* largest number of single steps after a failed block */
     PHI_TOO_MANY = 5 * PHI_LANES      /* recurrences are abandoned if a failed block leads to more single steps than this */
 };

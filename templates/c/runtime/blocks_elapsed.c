@@ -4,8 +4,8 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Compute the physical time of the step in each lane, a compensated sum over its stages: elapsed is the sum, lost its
-   compensation term. Returns 0 if the time of a stage does not have the sign of the step. */
+/* Compute the physical time of the step in each lane, a compensated sum over its stages: `elapsed` is the sum, `lost`
+   its compensation term. Returns 0 if the time of a stage does not have the sign of the step. */
 static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, phi_lanes elapsed, phi_lanes lost)
 {
     phi_lanes wrong = { 0.0 };

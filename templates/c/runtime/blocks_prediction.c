@@ -4,8 +4,8 @@
 #include <string.h>
 #include "blocks.c"
 
-/* model->y has the means of start and end of steps. Replace each by the point y at which (alpha + beta)/2 is this mean,
-   to leading order in the step size. */
+/* For each step, model->y holds the mean of its start and its end. Replace this mean by the point y at which (alpha +
+   beta)/2 is the mean, to leading order in the step size. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);

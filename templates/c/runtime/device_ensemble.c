@@ -16,7 +16,7 @@
 /* gauge has PHI_GAUGES numbers for each member if start_per_member is 1, and PHI_GAUGES numbers that hold for all
    members if it is 0. If gauge is NULL, gauges are chosen at the initial states. */
 #endif
-/* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
+/* `frames`, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */
 #if PHI_COMMON
 /* If PHI_COMMON is defined, the first argument has the coefficients that all members share; params_per_member and

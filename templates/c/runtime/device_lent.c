@@ -2,8 +2,8 @@
 #define PHI_FILE_DEVICE_LENT
 #include "device_solver.h"
 
-/* Assign shared memory to the predictors of a solver, after phi_init. memory has PHI_LENT doubles for each of PHI_GROUP
-   work items. */
+/* Assign shared memory to the predictors of a solver, after phi_init. `memory` has PHI_LENT doubles for each of
+   PHI_GROUP work items. */
 static void phi_lend(phi_solver *s, PHI_SHARED double *memory)
 {
     PHI_EACH_STAGE

@@ -10,8 +10,9 @@ static inline void phi_exchange(int condition, double *a, double *b)
     *b = condition ? first : second;
 }
 
-/* Solve matrix * solution = side by elimination with partial pivoting: side becomes the solution, matrix is overwritten.
-   Returns 0 if singular. Loops have constant bounds, so that a compiler can keep all entries in registers. */
+/* Solve `matrix` * x = `side` by elimination with partial pivoting; `side` receives x, and `matrix` is overwritten.
+   Returns 0 if the matrix is singular. Loops have constant bounds, so that a compiler can keep all entries in
+   registers. */
 static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 {
     int regular = 1;

@@ -19,7 +19,8 @@ phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
-/* Make steps of size h, which may be negative. If a step fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, which may be negative. If a step fails, s->x and s->steps remain those
+   before this step. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
 /* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is increment i of step k. NULL for random

@@ -112,8 +112,8 @@ static void phi_extend(phi_lanes coef[restrict], phi_expansion *e, double accura
     }
 }
 
-/* Check the equation dm/dt = pi(m) p at one end m of the paths, where their series have the given slopes. wrong becomes
-   infinite in lanes where it does not hold. */
+/* Check the equation dm/dt = pi(m) p at one end m of the paths, where their series have the given slopes. `wrong`
+   becomes infinite in lanes where it does not hold. */
 static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[restrict PHI_DIM],
     phi_lanes slope[restrict PHI_DIM], phi_lanes wrong)
 {
@@ -132,7 +132,8 @@ static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes 
     }
 }
 
-/* Check the equation dm/dt = pi(m) p at start and end of the paths. wrong becomes infinite in lanes where it does not hold. */
+/* Check the equation dm/dt = pi(m) p at start and end of the paths. `wrong` becomes infinite in lanes where it does not
+   hold. */
 static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes wrong)
 {
     phi_lanes start[PHI_DIM], end[PHI_DIM], start_slope[PHI_DIM], end_slope[PHI_DIM];
@@ -170,7 +171,7 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
 }
 
 /* Find the middles y + middle of the paths whose mean is y, by iteration. Each iteration gains some digits, and sums no
-   more terms than these digits need; the last expansion can be extended. middle becomes infinite in lanes that do not
+   more terms than these digits need; the last expansion can be extended. `middle` becomes infinite in lanes that do not
    converge. */
 static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e, double accuracy)
@@ -220,7 +221,7 @@ static void phi_vary_order(phi_expansion *e, int k)
     for (int j = 0; j < k; ++j) phi_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. size receives the
+/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. `size` receives the
    magnitudes of these terms; for derivatives by p, they are relative to the terms of order 1. */
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {

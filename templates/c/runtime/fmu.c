@@ -229,7 +229,7 @@ typedef struct {
     bool logging, may_return_early;
 } phi_fmu;
 
-/* Send a message to the logger of the environment; name is the name of the instance. */
+/* Send a message to the logger of the environment; `name` is the name of the instance. */
 static void phi_fmu_say(const phi_fmu_callbacks *to, const char *name, const char *message)
 {
     if (to->log_2 != NULL) to->log_2(to->environment, name, fmi2Error, "logStatusError", "%s", message);

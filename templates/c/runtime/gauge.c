@@ -48,8 +48,8 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
     return sum;
 }
 
-/* Value of the error at gauge[c] + t width, by Newton's formula from its forward differences: the error is a polynomial
-   in gauge[c]. */
+/* The error at gauge[c] + t * width (see phi_least_on_line). This polynomial in t is computed by Newton's formula from
+   its forward differences. */
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
     double error = difference[PHI_DEGREE];
@@ -57,7 +57,8 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
     return error;
 }
 
-/* Return the shift of gauge[c], in units of width, that minimises the error, by a search on successively finer grids. */
+/* Return the shift of gauge[c] that minimises the error, as a multiple of `width`. The search uses successively finer
+   grids. */
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])
 {

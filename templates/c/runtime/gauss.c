@@ -157,8 +157,8 @@ static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lane
 
 #endif
 #if PHI_FRAMED
-/* Transform the stage increments of a step that begins at point to the frame at the end of the step, which the next
-   step uses. */
+/* Transform the stage increments of a step that begins at `point` to the frame in which the next step starts. `end` is
+   the sum of the increments. */
 static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments,
     double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
@@ -177,7 +177,7 @@ static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], cons
 }
 
 #endif
-/* Store the increments of a step that begins at point, to predict the next step; end is their sum. */
+/* To predict the next step, store the increments of a step that begins at `point`; `end` is their sum. */
 static void phi_remember(phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;

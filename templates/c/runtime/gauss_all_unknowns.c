@@ -5,8 +5,8 @@
 #define PHI_READ(r) (r)
 
 #endif
-/* Predict the unknowns z at the stages of a step whose size is ratio times that of the last step, by the collocation
-   polynomial of the last step. */
+/* Predict the unknowns z at the stages of a step by the collocation polynomial of the last step. The size of the step
+   is `ratio` times the size of the last step. */
 static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
 {
     double factor[PHI_NODES];

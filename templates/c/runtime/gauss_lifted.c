@@ -56,7 +56,8 @@ static double phi_element_scale(const phi_solver *s)
     return 1.0 / square;
 }
 
-/* Replace the frames by those at the end of a step, in compensated arithmetic; end are the changes of the unknowns. */
+/* Replace the frames by those at the end of a step, in compensated arithmetic; `end` are the changes of the unknowns.
+   */
 static void phi_move_frames(phi_solver *s, const double end[PHI_UNKNOWNS])
 {
     for (int i = 0; i < PHI_LIFT; ++i) {

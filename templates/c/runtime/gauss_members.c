@@ -26,8 +26,8 @@ typedef struct {
     phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* weights h b_j of the stages */
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame at the end of the last step */
-    int latest;    /* index of the last step in the array increments */
-    int count;     /* number of steps in the array increments */
+    int latest;    /* index of the last step in the array `increments` */
+    int count;     /* number of steps in the array `increments` */
     int predictor; /* row of phi_prediction by which the next step is predicted */
     int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
     int sweeps;    /* number of the first sweep whose change is measured */
@@ -106,8 +106,8 @@ static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi
     return best;
 }
 
-/* Make a fixed-point sweep over all stages: compute the increments `now` from the unknowns z. Unless sum is NULL, add
-   the squared changes of the increments to sum. */
+/* Make a fixed-point sweep over all stages: compute the increments `now` from the unknowns z. Unless `sum` is NULL, add
+   the squared changes of the increments to `sum`. */
 static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z, phi_batch now, double *sum)
 {
     phi_lanes next[PHI_UNKNOWNS];

@@ -20,8 +20,8 @@ typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
     phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* past solutions of each stage, in a ring buffer */
     phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* weights of past solutions in the recurrences, the latest solution first */
-    int latest;     /* index of the latest solutions in past */
-    int count;      /* number of solutions in past */
+    int latest;     /* index of the latest solutions in the array `past` */
+    int count;      /* number of solutions in the array `past` */
     int PHI_OF(extrapolation_order, PHI_STAGES); /* number of solutions that the extrapolation uses */
     int PHI_OF(recurrence_terms, PHI_STAGES);    /* number of solutions that the recurrences use */
     int PHI_OF(use_recurrences, PHI_STAGES);     /* whether recurrences predict better than the extrapolation */

@@ -9,9 +9,9 @@
    only. Unknowns are offsets from a state, called their frame. A sweep iterates all stages once. */
 #endif
 typedef struct {
-    int count;     /* number of steps in the array increments */
+    int count;     /* number of steps in the array `increments` */
 #if PHI_STAGED
-    int latest;    /* index of the last step in the array increments */
+    int latest;    /* index of the last step in the array `increments` */
 #endif
     int sweeps;    /* number of the first sweep whose change is measured */
 #if PHI_STAGED

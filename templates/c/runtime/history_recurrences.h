@@ -2,10 +2,11 @@
 #define PHI_FILE_HISTORY_RECURRENCES_H
 enum { PHI_STORED_VALUES = 2 * PHI_REMEMBERED };
 
-/* Predictor: recent solutions of the implicit equation. They give the starting value of the next iteration by extrapolation,
-   or by a linear recurrence that is fitted to the last PHI_REMEMBERED solutions. It affects the speed only. */
+/* Predictor, which affects the speed only: recent solutions of the implicit equation. They give the starting value of
+   the next iteration by extrapolation, or by a linear recurrence that is fitted to the last PHI_REMEMBERED solutions.
+   */
 typedef struct {
-    int count;                       /* number of solutions in past */
+    int count;                       /* number of solutions in the array `past` */
     int extrapolation_order;         /* number of solutions that the extrapolation uses */
     int recurrence_terms;            /* number of solutions that the recurrence uses; 0 if none is fitted */
     int use_recurrence;              /* 1 if the recurrence predicts better than the extrapolation */

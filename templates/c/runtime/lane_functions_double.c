@@ -13,7 +13,7 @@ static inline double phi_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the bits of shifted; the lowest are the integer k */
+    uint64_t bits; /* the bits of `shifted`; the lowest bits are the integer k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -92,7 +92,7 @@ static inline double phi_turned_sin(double u, double offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const double reduced = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = reduced - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* bits of shifted; the last bit is the parity of k */
+    uint64_t parity, bits; /* bits of `shifted`; the last bit is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;

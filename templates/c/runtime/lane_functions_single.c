@@ -14,7 +14,7 @@ static inline float phi_exp_parts(float u, float *power)
 {
     const float shifted = u * 1.442695f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const float r = (u - k * 0.693359375f) + k * 2.1219444e-4f, rr = r * r;
-    uint32_t bits; /* the bits of shifted; the lowest are the integer k */
+    uint32_t bits; /* the bits of `shifted`; the lowest bits are the integer k */
     float sum = 0.0013888889f, other = 1.9841270e-4f;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 127) << 23;
@@ -79,7 +79,7 @@ static inline float phi_turned_sin(float u, float offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const float reduced = (u - k * 3.140625f) - k * 9.67502594e-4f;
     const float r = (reduced - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
-    uint32_t parity, bits; /* bits of shifted; the last bit is the parity of k */
+    uint32_t parity, bits; /* bits of `shifted`; the last bit is the parity of k */
     float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
     sum = sum * qq + -1.9841270e-4f;
     other = other * qq + 2.7557319e-6f;

@@ -19,7 +19,7 @@ static double phi_largest(const phi_lanes size)
 }
 #if PHI_BLOCKS
 
-/* Replace each lane of `most` by the larger of most and size, where NaN counts as larger than all numbers. */
+/* In each lane, replace `most` by the larger of `most` and `size`, where NaN counts as larger than all numbers. */
 static void phi_update_largest(phi_lanes most, const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], bits_of_most[PHI_LANES];

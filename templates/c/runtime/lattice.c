@@ -61,7 +61,7 @@ static void phi_take(const phi_solver *s, double *const *fields, double *x)
 
 #include "lattice_seams.c"
 
-/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
+/* Store a parameter at all sites: the array `values`, or `value` at each site if `values` is NULL. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = PHI_LEAST; i < PHI_MEMORY_OF(PHI_BEYOND); ++i) rows[i] = value;

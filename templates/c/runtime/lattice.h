@@ -48,7 +48,7 @@ phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
 /* Make one step, or many, and multiply the tangent vectors v[vector][field][site] by the derivative of these steps,
-   exact to round-off. count is the number of vectors, work is memory of phi_tangent_size(s, count) bytes. If a step
+   exact to round-off. `count` is the number of vectors, `work` is memory of phi_tangent_size(s, count) bytes. If a step
    fails, v is unchanged. */
 size_t phi_tangent_size(const phi_solver *s, size_t count);
 phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
@@ -58,8 +58,8 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
    not NULL, receives the states after stride, 2 * stride, ... steps and at the end. For L = sum of rows_bar * rows,
    x0_bar[field][site] receives the derivatives of L by the initial state. The derivatives of L by the parameters are
    added to *params_bar, if params_bar is not NULL; its arrays have a number for each site or bond, or are NULL.
-   Derivatives are exact to round-off. trail is work space of `size` bytes, at least phi_trail_size(s, 1). With
-   phi_trail_size(s, steps) bytes, each step is computed once; with less, steps are computed again from stored states,
+   Derivatives are exact to round-off. `trail` is work space of `size` bytes, at least phi_trail_size(s, 1). With
+   phi_trail_size(s, steps) bytes, each step is computed once; with less, `steps` are computed again from stored states,
    most of them once more. On failure all arguments are unchanged. */
 size_t phi_trail_size(const phi_solver *s, size_t steps);
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
@@ -69,7 +69,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
    phi_pullback stops and returns PHI_STOPPED. */
 void phi_ask(phi_solver *s, int (*stop)(void));
 
-/* phi_pullback for one step; trail has phi_trail_size(s, 1) bytes, and x0_bar may be x1_bar. */
+/* phi_pullback for one step; `trail` has phi_trail_size(s, 1) bytes, and x0_bar may be x1_bar. */
 phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, double *x0_bar, phi_params_bar *params_bar,
     void *trail);
 

@@ -85,8 +85,8 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
     }
 }
 
-/* Make the steps from number `done` to number `until` of a run. rows, if not NULL, receives the states after stride, 2
-   stride, ... steps and at the end of the run. keeping = 1 writes the tape. */
+/* Make the steps from number `done` to number `until` of a run. `rows`, if not NULL, receives the states after stride,
+   2 stride, ... steps and at the end of the run. keeping = 1 writes the tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {

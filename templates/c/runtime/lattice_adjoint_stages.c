@@ -79,8 +79,8 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
     return status;
 }
 
-/* Make the steps from number `done` to number `until` of a run. rows, if not NULL, receives the states after stride, 2
-   stride, ... steps and at the end of the run; predictors restart after each of these states. keeping = 1 writes the
+/* Make the steps from number `done` to number `until` of a run. `rows`, if not NULL, receives the states after stride,
+   2 stride, ... steps and at the end of the run; predictors restart after each of these states. keeping = 1 writes the
    tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)

@@ -65,8 +65,8 @@ static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)
 #include "adjoint_sweeps.h"
 #if PHI_SERIES
 
-/* Compute to = from (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, for all row segments. Called
-   by all threads together. */
+/* Compute `to` = `from` (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, for all row segments.
+   Called by all threads together. */
 static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from,
     double *const *to, size_t first, size_t end)
 {

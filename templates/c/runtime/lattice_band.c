@@ -25,8 +25,9 @@ static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
     return pivot;
 }
 
-/* Replace a band matrix, or with middle < 0 a full matrix, by its LU factors, with row exchanges. Columns are `tall` apart,
-   with at most `below` entries under the diagonal. pivots receives the exchanged rows. Returns 0 if singular. */
+/* Replace a band matrix, or with middle < 0 a full matrix, by its LU factors, with row exchanges. Columns are `tall`
+   apart, with at most `below` entries under the diagonal. `pivots` receives the exchanged rows. Returns 0 if singular.
+   */
 static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, double *pivots)
 {
     ptrdiff_t last = 0;

@@ -7,11 +7,11 @@
    part is computed, all planes that it reads must have completed the earlier stages. */
 typedef struct {
     size_t behind, ahead;        /* number of planes that are read before the first updated one, and after the last */
-    unsigned long read, changed; /* fields read on these planes, and fields that are updated: bit k is 1 for field k */
+    unsigned long read, changed; /* bit k of `read`: field k is read beyond the updated planes; bit k of `changed`: field k is updated */
 } phi_stage;
 
 size_t phi_stages(void);
-phi_status phi_describe(size_t number, phi_stage *about); /* sets *about for stage `number` */
+phi_status phi_describe(size_t number, phi_stage *about); /* writes to *about what stage `number` reads and updates */
 
 /* phi_begin computes the coefficients for a step size; call it before the first stage. phi_sweep makes a stage for the
    planes `from` ... `to` - 1. With full_range = 1, it uses functions for arguments of any size; with full_range = 0, it
@@ -19,8 +19,8 @@ phi_status phi_describe(size_t number, phi_stage *about); /* sets *about for sta
 phi_status phi_begin(phi_solver *s, double h);
 phi_status phi_sweep(phi_solver *s, size_t number, int full_range, size_t from, size_t to);
 
-/* Read or write the values x[plane][site] of a field, counted from 0, on the planes `from` ... `to` - 1. phi_holds returns
-   1 if all fields are finite on these planes. */
+/* Read or write the values x[plane][site] of field number `field` on the planes `from` ... `to` - 1. Fields and planes
+   are counted from 0. phi_holds returns 1 if all fields are finite on these planes. */
 phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x);
 phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, const double *x);
 int phi_holds(const phi_solver *s, size_t from, size_t to);

@@ -131,8 +131,8 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 
 enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
 
-/* Whether the caller wants to stop: calls s->stop if there were PHI_UNASKED site updates since its last call. steps is
-   the number of steps made since the last call of the present function. */
+/* Whether the caller wants to stop: calls s->stop if there were PHI_UNASKED site updates since its last call. `steps`
+   is the number of steps made since the last call of the present function. */
 static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 {
     g->unasked += steps * s->sites;
@@ -147,7 +147,7 @@ static void phi_fields_of_state(const phi_transpose *g, size_t number, double *f
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->states + (number * PHI_DIM + f) * g->block);
 }
 
-/* Store the present state as a checkpoint; done is its number of steps since the start of the run. */
+/* Store the present state as a checkpoint; `done` is its number of steps since the start of the run. */
 static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
 {
     double *fields[PHI_DIM];

@@ -10,12 +10,13 @@ typedef struct {
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
 
 #if PHI_DEFAULTS
-/* Initialise *s with the state x0[field][site]. work has phi_work_size(sizes, bonds->count) bytes, aligned as by malloc,
-   and must outlive *s. bonds may be NULL if there are none, params for the defaults; all arrays are copied. Returns PHI_BAD_ARGUMENT if sizes are not admissible, a bond does not connect two different sites, a value is
-   not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0[field][site]. `work` has phi_work_size(sizes, bonds->count) bytes, aligned as by
+   malloc, and must outlive *s. `bonds` may be NULL if there are none, params for the defaults; all arrays are copied.
+   Returns PHI_BAD_ARGUMENT if sizes are not admissible, a bond does not connect two different sites, a value is not
+   finite, or a parameter that must be positive is not. */
 #else
-/* Initialise *s with the state x0[field][site]. work has phi_work_size(sizes, bonds->count) bytes, aligned as by
-   malloc, and must outlive *s. bonds may be NULL if there are none. params must not be NULL, nor those of its arrays
+/* Initialise *s with the state x0[field][site]. `work` has phi_work_size(sizes, bonds->count) bytes, aligned as by
+   malloc, and must outlive *s. `bonds` may be NULL if there are none. params must not be NULL, nor those of its arrays
    that have no default. All arrays are copied. Returns PHI_BAD_ARGUMENT if sizes are not admissible, params or a
    required array is NULL, a bond does not connect two different sites, a value is not finite, or a parameter that
    must be positive is not. */

@@ -35,7 +35,7 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
     return sum;
 }
 
-/* Compute to = a x + b y at all sites, and the halo of `to`. */
+/* Compute `to` = a x + b y at all sites, and the halo of `to`. */
 static void phi_combine(const phi_solver *s, double *const *to, double a, double *const *x, double b, double *const *y)
 {
     const size_t units = phi_units(s);
@@ -57,7 +57,7 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
 
 #include "lattice_site_blocks.c"
 
-/* Compute to = from - v, where v solves A v = s->space[0] and phi_multiply multiplies by A. The method is GMRES (Y.
+/* Compute `to` = `from` - v, where v solves A v = s->space[0] and phi_multiply multiplies by A. The method is GMRES (Y.
    Saad and M. H. Schultz) with PHI_DIRECTIONS directions, without restart. Returns the norm of s->space[0], or infinity
    if the residual is too large for v to be useful. */
 static double phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)

@@ -3,8 +3,8 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Compute to = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. J v is a difference quotient; s->y[1 - now]
-   must hold the result of the sweep. */
+/* Compute `to` = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. J v is a difference
+   quotient; s->y[1 - now] must hold the result of the sweep. */
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {
     const size_t units = phi_units(s);

@@ -4,10 +4,10 @@
 #include "model.h"
 
 #if PHI_ADJOINT
-/* Compute to = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]; in a reverse pass, when s->side is not NULL,
-   to = v - J^T v. */
+/* Compute `to` = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. In a reverse pass
+   s->side is not NULL; then compute `to` = v - J^T v. */
 #else
-/* Compute to = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. */
+/* Compute `to` = v - J v, where J is the derivative of a sweep with respect to y at s->y[now]. */
 #endif
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {

@@ -16,7 +16,7 @@ typedef struct {
     double *pivots;          /* exchanged rows of A, then of D */
 } phi_matrix;
 
-/* Set the sizes of *m and, unless memory is NULL, its pointers; returns the number of doubles in memory. */
+/* Set the sizes of *m and, unless `memory` is NULL, its pointers; returns the number of doubles in `memory`. */
 static size_t phi_matrix_of(size_t sites, double *memory, phi_matrix *m)
 {
     const size_t few = sites <= PHI_FEW ? sites : phi_open[0] ? 0 : PHI_REACH;

@@ -14,7 +14,7 @@
 #include "lattice_newton_policy.h"
 #include "lattice_sweep_policy.h"
 
-/* The sum of |y - x| + added |x| over all fields and sites, for y = s->y[side]. */
+/* The sum of |y - x| + `added` * |x| over all fields and sites, for y = s->y[side]. */
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -60,8 +60,9 @@ static double phi_range(phi_solver *s, const double *coef)
 }
 
 
-/* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now]. The method is
-   fixed-point sweeps. If s->stiff, it is Newton corrections; solutions farther from x than `range` are then refused. */
+/* Solve the equation of a stage for y to rounding level, starting from s->y[0]; the solution is s->y[*now]. Iterate by
+   fixed-point sweeps or, if s->stiff, by Newton's method. Newton's method fails for solutions farther from x than
+   `range`. */
 static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_RANGE, double range, int *now)
 {
     double before = 0.0;
@@ -72,7 +73,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FULL_
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* stop at rounding level, or if further sweeps would change too little at the rate change / before */
+        /* stop at rounding level, or if the sum of all further changes, change^2 / shrunk, is negligible */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
             return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
         if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > PHI_NEARLY_SETTLED) break;

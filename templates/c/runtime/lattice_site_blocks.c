@@ -45,7 +45,7 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     }
 }
 
-/* Compute to = from + (preconditioner) v; from may be NULL for 0. */
+/* Compute `to` = `from` + (preconditioner) v; `from` may be NULL for 0. */
 static void phi_apply_blocks(const phi_solver *s, double *const *v, double *const *from, double *const *to)
 {
     const size_t units = phi_units(s);

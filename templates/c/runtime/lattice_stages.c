@@ -10,7 +10,7 @@
 
 /* ---- The stages ---- */
 #include "lattice_sweep_policy.h"
-enum { PHI_WIDTH = 32 }; /* number of partial results in reductions over sites, so that these loops vectorise */
+enum { PHI_WIDTH = 32 }; /* number of partial results in a reduction over sites; with a single result, the loop would not vectorise */
 
 static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
 
@@ -45,7 +45,7 @@ static void phi_measure(const phi_solver *s, int now, size_t unit, double *chang
 }
 
 #if PHI_ADJOINT
-/* Compute to = from (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, at all sites. */
+/* Compute `to` = `from` (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, at all sites. */
 static void phi_pull(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from, double *const *to)
 {
     PHI_PARALLEL

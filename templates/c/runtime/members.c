@@ -44,7 +44,7 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
     return status == PHI_OK ? phi_integrate(s, all->h[m * all->per_member], 0) : status;
 }
 
-/* Initialise a solver for member m at its state in the ensemble, which is copied to x. */
+/* Copy the state of member m from the ensemble to x, and initialise a solver for this member. */
 static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
@@ -67,7 +67,7 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
 
 #include "members_attitudes.c"
 
-/* Make the remaining steps of member m by itself; `done` steps have been made, status is the present status. */
+/* Make the remaining steps of member m by itself; `done` steps are made, `status` is the present status. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {
     while (done < all->steps) {

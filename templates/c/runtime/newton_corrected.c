@@ -32,7 +32,8 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 }
 
-/* Correct y by its residuals, with the inverse of the Newton matrix; size receives the sizes of the corrections. */
+/* Correct y by its residuals, with the inverse of the Newton matrix. `size` receives the size of the correction in each
+   lane. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];

@@ -4,8 +4,8 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Correct y by its residuals, with the factors of the Newton matrix; size receives the sizes of the corrections. Also compute
-   the corrections of the increments that the residuals cause. */
+/* Correct y by its residuals, with the factors of the Newton matrix. `size` receives the size of the correction in each
+   lane. Also compute the corrections of the increments that the residuals cause. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];

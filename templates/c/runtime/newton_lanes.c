@@ -41,7 +41,7 @@ static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes uni
     }
 }
 
-/* Subtract the correction delta from y. size receives the weighted sum of |delta_i|, with the weights `unit`. */
+/* Subtract the correction `delta` from y. `size` receives the weighted sum of |delta_i|, with the weights `unit`. */
 static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     memset(size, 0, PHI_LANES * sizeof size[0]);
@@ -59,8 +59,9 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #include "newton_corrected_sparse.c"
 #include "newton_corrected.c"
 
-/* Relative sizes of corrections. After a correction below PHI_FROZEN, the matrices are reused. After a correction below
-   PHI_SMALL, its square is below rounding, and the next one is the last if it is below PHI_BLOCK_ROUNDING. */
+/* Relative sizes of corrections. After a correction below PHI_FROZEN, the matrices are reused. If a correction is below
+   PHI_SMALL, its square is below rounding level; the next correction is then the last one if it is below
+   PHI_BLOCK_ROUNDING. */
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_BLOCK_ROUNDING 1e-10

@@ -22,8 +22,8 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 
 #include "noise_of_flows.c"
 
-/* Set the increments of the noise in the next step: to those of the caller, or if increments is NULL, to random ones.
-   Returns 0 if one is not finite. */
+/* Set the increments of the noise in the next step to `increments`, or to random numbers if `increments` is NULL.
+   Returns 0 if an increment is not finite. */
 static int phi_draw(phi_solver *s, const double *increments)
 {
     if (increments != NULL) {

@@ -27,8 +27,9 @@ static int phi_holds(const double *coef, const double p[PHI_DIM], const double m
     return 1;
 }
 
-/* Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean of
-   m - start. Terms are added until they are negligible. Returns 0 if PHI_TERMS terms do not suffice. */
+/* Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m(0) = `start`, by its Taylor series. `change` receives m(1) -
+   m(0), and `mean` the mean of m(t) - m(0). Terms are added until they are negligible. Returns 0 if PHI_TERMS terms do
+   not suffice. */
 static int phi_piece(const double *coef, const double p[PHI_DIM], const double start[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM])
 {
@@ -58,10 +59,10 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is the end of
-   the path minus x, mean is the mean of the path minus x. For any p, the end of the path lies on the symplectic leaf of
-   x. Returns 0 if the path is too long or leaves the domain of pi. *pieces_used increases by the number of computed
-   pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges. `change` receives the
+   end of the path minus x, and `mean` the mean of the path minus x. For any p, the end of the path lies on the
+   symplectic leaf of x. Returns 0 if the path is too long or leaves the domain of pi. *pieces_used increases by the
+   number of computed pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM], int *pieces_used)
 {

@@ -8,8 +8,8 @@
 
 #define PHI_NEAR_BY 0.125 /* largest relative change of the state after which predictors are shifted rather than cleared */
 
-/* After a change of the state, shift the past solutions that the extrapolation needs: for a motion through the new x, a
-   past solution differs by the change of the state, minus the change of the vector field times the time since then.
+/* Adapt the predictors to a change of the state by d. Let f be the change of the vector field. A past solution at the
+   time t before the new state is shifted by d - t f: to first order, it then lies on the motion through the new state.
    Recurrences are dropped, since they were fitted to the former motion. After a large change, the next step clears the
    predictors. */
 static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])

@@ -40,7 +40,7 @@ static void phi_project(int rows, double (*one)[8], int column, double *inverse,
     }
 }
 
-/* Largest error of the recurrences as predictions of the last values in the array, which were not used in the fit. */
+/* Largest error with which the recurrences predict the last values in the array. The fit does not use these values. */
 static double phi_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };
@@ -61,7 +61,7 @@ static double phi_missed(const double *value, double (*weight)[8])
 static int phi_train(phi_history *history, int component)
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, ROWS = PHI_ROWS };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* each part has eight columns */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* the first index of q and of r counts groups of eight columns */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[PHI_REMEMBERED], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
@@ -74,7 +74,7 @@ static int phi_train(phi_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > PHI_ENOUGH * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* the rows after these belong to the regularisation of later columns, and are 0 here */
+        const int part = terms / 8, rows = ROWS + terms + 8; /* the rows after the first `rows` belong to the regularisation of later columns, and are 0 here */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
         for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = PHI_RIDGE * largest;

@@ -53,7 +53,7 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
     }
 }
 
-/* Store the offsets of all rows and their neighbours in memory, for s->lines. */
+/* Store the offsets of all rows and of their neighbours in `memory`; s->lines points to them. */
 static void phi_find_all_lines(phi_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;

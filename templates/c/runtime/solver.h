@@ -62,16 +62,16 @@ phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double 
     const double gauge[PHI_GAUGES]);
 
 #if PHI_MONITOR
-/* Make one step or many. Their size h in tau may be negative; s->t increases by their physical time. If a step fails, s->x
-   is the state before it, after s->steps steps. */
+/* Make one step or many. Their size h in tau may be negative; s->t increases by their physical time. If a step fails,
+   s->x and s->steps remain those before this step. */
 #else
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, of either sign. If a step fails, s->x and s->steps remain those before this step. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns PHI_BAD_ARGUMENT, with *s
-   unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add `change` to the state. The values of Casimirs may change. Returns
+   PHI_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 #if PHI_MONITOR
 /* The energy level e becomes -H of the new state, at which phi_monitor must be positive. */
 #endif
@@ -128,7 +128,7 @@ phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, 
 #else
 /* As phi_ensemble, for members with separate parameters params[m] and step sizes h[m]. params may be NULL for the defaults. */
 #endif
-/* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
+/* `frames`, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. Arrays must not overlap. */
 phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *frames, unsigned char *status);
@@ -156,9 +156,9 @@ phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM
     phi_params *params_bar);
 
 /* Make many steps as phi_integrate does, and their reverse pass (vector-Jacobian product) for a number L. rows[r *
-   PHI_DIM + i], if rows is not NULL, receives x_i after stride, 2 * stride, ... steps and at the end; with stride =
+   PHI_DIM + i], if `rows` is not NULL, receives x_i after stride, 2 * stride, ... steps and at the end; with stride =
    steps there is one row. rows_bar are the derivatives of L by these rows. x0_bar receives the derivatives of L by the
-   initial state; the derivatives of L by the parameters are added to *params_bar, if params_bar is not NULL. trail is
+   initial state; the derivatives of L by the parameters are added to *params_bar, if params_bar is not NULL. `trail` is
    work space for the tape: PHI_TRAIL numbers for each step. */
 #if PHI_MONITOR
 /* The derivative of L by the energy level e is added to *e_bar, if e_bar is not NULL. If phi_init has set e = -H(x0),
@@ -170,12 +170,12 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 void phi_level_bar(const phi_params *params, const double x0[PHI_DIM], double e_bar, double x0_bar[PHI_DIM],
     phi_params *params_bar);
 
-/* phi_pullback for an ensemble. Member m starts at x0 + m * PHI_DIM, with params[m] and h[m]; params may be NULL for the
-   defaults. rows and rows_bar hold all rows of member 0, then those of member 1, and so on. x0_bar has the layout of x0;
-   derivatives by the parameters of member m are added to params_bar[m]. trail is work space for PHI_TRAIL_EACH numbers
-   for each step, for any number of members. status, if not NULL, receives the status of each member. Returns the first
-   status that is not PHI_OK. Several threads may each call this function for a part of the members, with separate trails;
-   results have the same bits if parts start at multiples of 32. */
+/* phi_pullback for an ensemble. Member m starts at x0 + m * PHI_DIM, with params[m] and h[m]; params may be NULL for
+   the defaults. rows and rows_bar hold all rows of member 0, then those of member 1, and so on. x0_bar has the layout
+   of x0; derivatives by the parameters of member m are added to params_bar[m]. `trail` is work space for PHI_TRAIL_EACH
+   numbers for each step, for any number of members. `status`, if not NULL, receives the status of each member. Returns
+   the first status that is not PHI_OK. Several threads may each call this function for a part of the members, with
+   separate trails; results have the same bits if parts start at multiples of 32. */
 phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
     double *trail, unsigned char *status);

@@ -12,7 +12,7 @@ static int phi_tangent_solved(double size, double previous)
     return size <= PHI_TANGENT_SOLVED || stalled;
 }
 
-/* Solve matrix * solution = sides for all columns of sides, which become the solutions. Returns 0 if singular. */
+/* Solve `matrix` * X = `sides` for all columns of X; `sides` receives X. Returns 0 if the matrix is singular. */
 static int phi_tangent_solve(const double matrix[PHI_DIM * PHI_DIM], double sides[PHI_DIM * PHI_DIM])
 {
     for (int j = 0; j < PHI_DIM; ++j) {

@@ -24,8 +24,8 @@ static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], co
     return 1;
 }
 
-/* Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change receives the end minus
-   the start, mean the mean minus the start. Returns 0 if PHI_TERMS terms do not suffice. */
+/* Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series. `change` receives the end minus
+   the start, and `mean` the mean minus the start. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], const double start[2 * PHI_DIM],
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {

@@ -9,8 +9,8 @@
 #include "tangent_flows.h"
 #include "tangent_product.c"
 
-/* Compute the derivative of one step, the product of the derivatives of its flows, and the change of x + carry in the step.
-   The argument value is unused. */
+/* Compute the derivative of one step, the product of the derivatives of its flows, and the change of x + carry in the
+   step. The argument `value` is unused. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

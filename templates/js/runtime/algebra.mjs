@@ -6,8 +6,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state by compensated summation. small contains the compensation term, and other
- * terms that are much smaller than change.
+ * Add `change` + `small` to the state by compensated summation. `small` contains the compensation term, and
+ * other terms that are much smaller than `change`.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

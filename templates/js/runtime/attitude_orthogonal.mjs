@@ -1,7 +1,7 @@
 import { identityElement } from "./attitude_matrices.mjs";
 import { ROWS } from "./model.mjs";
 
-/** Subtract G (G^T G - 1)/2 from carry: G + carry is then nearer to an orthogonal matrix than G. */
+/** Subtract G (G^T G - 1)/2 from `carry`: G + `carry` is then nearer to an orthogonal matrix than G. */
 export function normalise(g, carry) {
   for (let i = 0; i < ROWS; i++) {
     for (let j = 0; j < ROWS; j++) {

@@ -17,7 +17,7 @@ export function elementProduct(a, b, product) {
   multiplyPositions(a, b, product);
 }
 
-/** Correct carry so that the length of q + carry is nearer to 1 than that of q. */
+/** Correct `carry` so that the length of q + `carry` is nearer to 1 than that of q. */
 export function normalise(q, carry) {
   const excess = 0.5 * (q[0] * q[0] - 1 + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]));
   for (let i = 0; i < 4; i++) carry[i] -= excess * q[i];

@@ -16,7 +16,7 @@ export function stages() {
   return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
 }
 
-/** Predictor: results of the last step, from which the next iteration starts. It affects the speed only. */
+/** Predictor, which affects the speed only: results of the last step, the start of the next iteration. */
 export class History {
   /** Whether a step is stored, and whether the state was changed since that step. */
   stored = false;

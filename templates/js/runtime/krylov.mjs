@@ -9,12 +9,12 @@ const dot = (a, b) => a.reduce((sum, v, k) => sum + v * b[k], 0);
 const norm = (a) => Math.sqrt(dot(a, a));
 const total = (a) => a.reduce((sum, v) => sum + Math.abs(v), 0);
 
-/** Add factor * b to a. */
+/** Add `factor` * b to a. */
 function add(a, factor, b) {
   for (let k = 0; k < a.length; k++) a[k] += factor * b[k];
 }
 
-/** A solution v of matrix(v) = side by GMRES without restart; null if its residual exceeds USEFUL |side|. */
+/** A solution v of `matrix`(v) = `side` by GMRES without restart; null for a residual over USEFUL |side|. */
 function krylov(matrix, side) {
   const length = norm(side);
   const solution = new Float64Array(side.length);
@@ -53,7 +53,7 @@ function krylov(matrix, side) {
   return solution;
 }
 
-/** The solution v of v - S v = side, where S is the derivative of a sweep; null if `krylov` finds none. */
+/** The solution v of v - S v = `side`, where S is the derivative of a sweep; null if `krylov` finds none. */
 export function linearised(coef, x, y, side, sizes, sites) {
   const count = y.length / sizes.length;
   const unit = (k) => sizes[Math.floor(k / count)];

@@ -4,7 +4,7 @@ import { DIM } from "./model.mjs";
 export const TINY = 2.2250738585072014e-308;
 
 /**
- * Solve matrix · solution = side by elimination with partial pivoting. The arguments are overwritten.
+ * Solve `matrix` · x = `side` by elimination with partial pivoting. The arguments are overwritten.
  *
  * @param {Float64Array} matrix row by row
  * @param {Float64Array} side is overwritten with the solution

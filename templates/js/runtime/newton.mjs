@@ -12,8 +12,8 @@ import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
- * |y_j|. It is NaN or infinite if a component of the correction is.
+ * Relative size of a correction of y: the largest |correction_i| / (|y_i| + FLOOR max_j |y_j|). It is NaN or
+ * infinite if a component of the correction is.
  */
 export function relativeSize(y, correction) {
   let norm = 0;

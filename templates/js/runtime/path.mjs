@@ -34,8 +34,9 @@ function holds(coef, p) {
 }
 
 /**
- * Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: shift is m(1) - start, mean
- * the mean of m - start. Terms are added until they are negligible. Returns false if TERMS do not suffice.
+ * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m(0) = `start`, by its Taylor series. `shift` receives
+ * m(1) - m(0), and `mean` the mean of m(t) - m(0). Terms are added until they are negligible. Returns false
+ * if TERMS do not suffice.
  */
 function followPiece(coef, p, start, shift, mean) {
   let norm = 0;
@@ -70,9 +71,9 @@ const shift = new Float64Array(DIM);
 const local = new Float64Array(DIM);
 
 /**
- * Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
- * the end of the path minus x, mean is the mean of the path minus x. For any p, the end of the path lies on
- * the symplectic leaf of x.
+ * Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges. `change`
+ * receives the end of the path minus x, and `mean` the mean of the path minus x. For any p, the end of the
+ * path lies on the symplectic leaf of x.
  *
  * @returns {{good: boolean, piecesUsed: number}} good: whether the path is short enough and in the domain;
  *     piecesUsed: number of pieces computed

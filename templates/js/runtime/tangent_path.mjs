@@ -20,8 +20,8 @@ function tangentHolds(coef, p, f, m, slope) {
 }
 
 /**
- * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change receives the
- * end minus the start, mean the mean minus the start.
+ * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series. `change` receives the
+ * end minus the start, and `mean` the mean minus the start.
  *
  * @returns {boolean} false if TERMS terms do not suffice
  */

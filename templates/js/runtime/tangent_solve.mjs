@@ -8,7 +8,7 @@ export function tangentSolved(size, previous) {
 }
 
 /**
- * The solution of matrix · solution = sides, for all columns of sides; all matrices are stored row by row.
+ * The solution X of `matrix` · X = `sides`, for all columns of X; all matrices are stored row by row.
  *
  * @returns {Float64Array | null} null if the matrix is singular
  */

@@ -54,9 +54,7 @@ def declarations(program: Program, step: Sweeps) -> str:
             else []
         )
     if step.partners:
-        sizes.append(
-            ("GATHERED", _gathered(layout), "number of sums over bonds or pairs that are stored for each site")
-        )
+        sizes.append(("GATHERED", _gathered(layout), "for each site, number of stored sums over its bonds or pairs"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "number of parameters at bonds"))
     values = {
