@@ -90,7 +90,10 @@ def group_of(system: System, requested: str, kind: str) -> Group:
     """
     algebra = system.lie_algebra
     if algebra is None:
-        hint = "attitudes need a Lie–Poisson structure, as that of a rigid body or a top"
+        hint = (
+            "attitudes need a Lie–Poisson structure, as that of a rigid body or a top; "
+            "for other structures, make a quaternion part of the coordinates, as the spec quaternion_top does"
+        )
         raise refused(system, f"reconstruct: {requested} needs a linear π, the dual of a Lie algebra; this π is "
                       f"{system.shape}", hint)  # fmt: skip
     return _rotations(system, algebra) if requested == QUATERNION else _matrices(system, algebra, kind)

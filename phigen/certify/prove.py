@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import arb, ctx
 
+from phigen import progress
 from phigen._version import __version__
 from phigen.certify.checker import (
     BALL,
@@ -137,9 +138,9 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
     """Return the certificate of a problem. Raises `RefusedError` if no certificate with at most ``max_boxes`` boxes is
     found."""
     certificate = described(problem)
-    with precise():
+    with precise(), progress.stage(f"{problem.name}: boxes of the certificate") as running:
         leaves = list[tuple[list[float], list[float]]]()
-        search = _Search(certificate, problem.within, max_boxes, leaves, [])
+        search = _Search(certificate, problem.within, max_boxes, leaves, [], running)
         tree = search.tree([*certificate["domain"], certificate["time"]])
     largest_bounds, largest = (
         [max(column) for column in zip(*parts, strict=True)] for parts in zip(*leaves, strict=True)
@@ -159,6 +160,7 @@ class _Search:
     # for each box with a proof: error bounds, and largest absolute values of the coordinates
     leaves: list[tuple[list[float], list[float]]]
     divided: list[int]  # depth of each box that was divided
+    running: progress.Stage
 
     def tree(self, domain: Box, depth: int = 0) -> dict[str, Any]:
         """Return the proof for a box as a tree. If no proof for the whole box is found, the tree has proofs for its two
@@ -168,6 +170,7 @@ class _Search:
         """
         c = self.certificate
         *X, T = [interval(d) for d in domain]
+        self.running.done += 1
         try:
             leaf = _leaf(c, X, T)
             bounds, image = step(c, X, T, leaf)

@@ -14,6 +14,7 @@ from typing import Any
 
 from flint import arb, arb_mat, ctx
 
+from phigen import progress
 from phigen.certify.checker import identity, run_of
 
 #: Precision in bits for the computation of the exact map.
@@ -86,15 +87,17 @@ def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count
     """
     exact_step = ExactMap(exact)
     draw, worst = random.Random(seed), [0.0] * len(c["domain"])
-    for k in range(count):
-        x = [draw.uniform(*d) for d in c["domain"]]
-        carry = [draw.uniform(-0.5, 0.5) * 2.0**-52 * abs(v) * (k % 2) / 2 for v in x]
-        t = draw.uniform(*c["time"])
-        computed = one_step(c, library, x, carry, t)
-        with _precise():
-            exact_image = exact_step([arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
-            errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*computed, exact_image, strict=True)]
-        worst = [max(pair) for pair in zip(worst, errors, strict=True)]
+    with progress.stage(f"{c['name']}: steps compared with the exact map", count) as running:
+        for k in range(count):
+            x = [draw.uniform(*d) for d in c["domain"]]
+            carry = [draw.uniform(-0.5, 0.5) * 2.0**-52 * abs(v) * (k % 2) / 2 for v in x]
+            t = draw.uniform(*c["time"])
+            computed = one_step(c, library, x, carry, t)
+            with _precise():
+                exact_image = exact_step([arb(a) + arb(b) for a, b in zip(x, carry, strict=True)], t)
+                errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*computed, exact_image, strict=True)]
+            worst = [max(pair) for pair in zip(worst, errors, strict=True)]
+            running.done = k + 1
     return worst
 
 

@@ -28,6 +28,9 @@ LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
+#: Kind of the unit of a quantity that is infinite or NaN at the start, so that it has no errors.
+UNDEFINED = "no value at the start"
+
 #: Name of the energy among the conserved quantities of a system.
 ENERGY = "energy"
 
@@ -45,9 +48,9 @@ class Unit:
     """The unit in which errors of a quantity are measured: errors are divided by the number ``size``.
 
     ``kind`` says what ``size`` is. `RELATIVE`: the absolute value of the quantity at the start. `TERMS`: the size of
-    its terms at the start. `SITES`: the sum of the absolute energies of the sites at the start. `ABSOLUTE`: 1.
-    ``terms`` is the size of the terms in this unit; rounding errors are proportional to it. ``moves`` is true if time,
-    forces or noise change the quantity, so that its changes are no errors.
+    its terms at the start. `SITES`: the sum of the absolute energies of the sites at the start. `ABSOLUTE` and
+    `UNDEFINED`: 1. ``terms`` is the size of the terms in this unit; rounding errors are proportional to it. ``moves``
+    is true if time, forces or noise change the quantity, so that its changes are no errors.
     """
 
     size: float = 1.0
@@ -58,7 +61,7 @@ class Unit:
     @property
     def adjective(self) -> str:
         """The word for errors in this unit: ``relative`` or ``absolute``."""
-        return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
+        return ABSOLUTE if self.kind in (ABSOLUTE, UNDEFINED) else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
         """Return the errors of a quantity along a trajectory, in this unit.
@@ -105,7 +108,9 @@ def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
     ``value`` is small compared with ``terms``, errors are relative to ``terms``. The ``kind`` of the result is then the
     argument ``kind``, which is `TERMS` or `SITES`.
     """
-    if abs(value) > SMALL * terms and math.isfinite(value):
+    if not math.isfinite(value):
+        return Unit(kind=UNDEFINED)
+    if abs(value) > SMALL * terms:
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
     return Unit(terms, kind) if 0 < terms < math.inf else Unit()
 
@@ -142,6 +147,7 @@ def stated(units_by_name: Mapping[str, Unit]) -> str:
         (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| at the start, since {0} is nearly 0 there"),
         (SITES, "relative to Σ |{0} of a site| at the start, since {0} is nearly 0 there"),
         (ABSOLUTE, "absolute, since {0} is 0 at the start"),
+        (UNDEFINED, "unknown, since {0} has no value at the start"),
     ):
         for name in (name for name, unit in units_by_name.items() if unit.kind == kind):
             clauses.append(f"{'those' if clauses else errors} of {name} are {description.format(_letter(name))}")

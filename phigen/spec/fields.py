@@ -29,6 +29,7 @@ from phigen.spec.names import (
     FAMILY_HELP,
     IDENTIFIER,
     KEPT,
+    OTHER_TARGETS,
     OVER,
     PARTS,
     PROFILES,
@@ -743,7 +744,9 @@ SPEC = Record(
             "for a Lie–Poisson structure: also compute the attitude, as a quaternion (on se(3) with the "
             "position) or a matrix",
         ),
-        RecordKey("targets", ListOf(OneOf(tuple(TARGETS)), least=1), "the languages of the generated code"),
+        RecordKey(
+            "targets", ListOf(OneOf(tuple(TARGETS), OTHER_TARGETS), least=1), "the languages of the generated code"
+        ),
         RecordKey("runs", MapOf(RUN_NAME, RUN), "named runs: each has initial values, a step size and a length"),
         RecordKey(
             "sweeps",

@@ -95,7 +95,10 @@ class AllowedNames:
             return f"{shown(name)} is not a finite number", ""
         if name == "t":
             return "the name 't' is not declared", "if t is the time, add time: t to the spec"
-        return f"the name {shown(name)} is not declared", did_you_mean(name, [*self.names, *CONSTANTS])
+        hint = did_you_mean(name, [*self.names, *CONSTANTS])
+        if name == "e" and "E" not in self.names and hint == "did you mean 'E'?":
+            hint = "if e is Euler's number, write E; otherwise declare e, for example under parameters"
+        return f"the name {shown(name)} is not declared", hint
 
 
 _TOKEN = re.compile(
@@ -276,6 +279,9 @@ class Parser:
                 "comparisons are allowed only inside if(a < b, …), in observables and stop",
             )
         hint = f"write products with *: {previous.text[-20:]}*{token.text[:20]}"
+        measured = previous.kind == "number" and previous.text != "0" and token.kind == "name"
+        if measured and self.scope.lookup(token.text) is None:
+            hint += "; numbers have no units, but a parameter may have the key unit"
         return self.abandon(f"an operator is missing before {shown(token.text)}", token.index, hint)
 
     def sum(self) -> Expression:
@@ -427,7 +433,8 @@ class Parser:
         arity = PIECEWISE_FUNCTIONS[name]
         if len(arguments) != arity:
             signature = "a condition and 2 values" if name == "if" else counted(arity, "argument")
-            self.report(f"{name} takes {signature}, not {counted(len(arguments), 'argument')}", token.index)
+            hint = f"write {name}(a, {name}(b, c))" if arity == 2 and len(arguments) > 2 else ""
+            self.report(f"{name} takes {signature}, not {counted(len(arguments), 'argument')}", token.index, hint)
             return ONE
         return _PIECEWISE[name](*arguments)
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from phigen.errors import Location
 from phigen.spec import limits
-from phigen.spec.names import MEANT
+from phigen.spec.names import IDENTIFIER, MEANT, MEANT_WORDS
 from phigen.spec.problems import Problems, counted, did_you_mean, intended, one_of, shown
 from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
@@ -64,9 +64,22 @@ def list_hint(node: Node) -> str:
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
         return f"{_LISTS}; the names alone are written [{', '.join(names)}]" if names else _LISTS
-    if isinstance(node, Scalar) and not node.is_null and len(node.text) < 20:
-        return f"{_LISTS}, and a list of one is [{node.text}]"
+    if isinstance(node, Scalar) and not node.is_null:
+        names = listed(node.text)
+        if names:
+            return f"write [{', '.join(names)}]"
+        if len(node.text) < 20:
+            return f"{_LISTS}, and a list of one is [{node.text}]"
     return _LISTS
+
+
+def listed(text: str) -> list[str]:
+    """Return the names in a text that has two or more names with commas, semicolons or blanks between them.
+
+    The list is empty for other texts.
+    """
+    names = re.split(r"\s*[,;]\s*|\s+", text)
+    return names if 1 < len(names) < 20 and all(re.fullmatch(IDENTIFIER, name) for name in names) else []
 
 
 class Kind:
@@ -130,21 +143,25 @@ class ShapedText(Kind):
     example: str = ""
 
     def read(self, node: Node, path: Path, reader: Reader) -> Scalar | None:
-        if not isinstance(node, Scalar) or node.is_null:
+        if not isinstance(node, Scalar):
             return self.mismatch(node, path, reader, self.example)
-        if node.boolean is not None:
-            return self.mismatch(node, path, reader, self.example or f"quotes make it a name: '{node.text}'")
-        return node if self.accepts(node, reader) else None
+        if node.is_null or node.boolean is not None:
+            named = re.fullmatch(self.pattern, node.text)
+            return self.mismatch(
+                node, path, reader, self.example or (f"quotes make it a name: '{node.text}'" if named else "")
+            )
+        names = listed(node.text) if path and isinstance(path[-1], int) else []
+        return node if self.accepts(node, reader, f"write commas: {', '.join(names)}" if names else "") else None
 
-    def accepts(self, node: Scalar, reader: Reader) -> bool:
-        """Return whether the text matches and is not too long. Otherwise an error is reported."""
+    def accepts(self, node: Scalar, reader: Reader, hint: str = "") -> bool:
+        """Return whether the text matches and is not too long. Otherwise report an error with ``hint``."""
         if len(node.text) > self.longest:
             message = f"the name {shown(node.text, 30)} has {len(node.text)} characters, the limit is {self.longest}"
             reader.error(node, message, limit=True)
         elif not re.fullmatch(self.pattern, node.text):
             strange = [c for c in node.text if not c.isascii() or not c.isprintable()]
             detail = f" ({describe(strange[0])})" if strange else ""
-            reader.error(node, f"{shown(node.text)} is not {self.expected}{detail}", self.hint)
+            reader.error(node, f"{shown(node.text)} is not {self.expected}{detail}", hint or self.hint)
         else:
             return True
         return False
@@ -155,9 +172,10 @@ class ShapedText(Kind):
 
 @dataclass(frozen=True)
 class OneOf(Kind):
-    """A value that must be one of the listed ``words``."""
+    """A value that must be one of the listed ``words``. ``hints`` has hints for some other words."""
 
     words: tuple[str, ...]
+    hints: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def expected(self) -> str:  # type: ignore[override]
@@ -168,7 +186,7 @@ class OneOf(Kind):
             return self.mismatch(node, path, reader)
         if node.text in self.words:
             return node.text
-        hint = did_you_mean(node.text, self.words) or self.expected
+        hint = self.hints.get(node.text) or did_you_mean(node.text, self.words, MEANT_WORDS) or self.expected
         return reader.error(node, f"{label(path)}{shown(node.text)} is not known", hint)
 
     def schema(self) -> Schema:

@@ -52,6 +52,24 @@ MEANT = {
     "method": "scheme", "integrator": "scheme",
 }  # fmt: skip
 
+#: Words of other programs, with the words that specs have instead as values.
+MEANT_WORDS = {
+    "python": "numpy", "javascript": "js", "JavaScript": "js", "cuda": "device", "opencl": "device", "gpu": "device",
+    "single": "float", "float32": "float", "float64": "double", "misra": "certified",
+    "-": "minus", "-1": "minus", "negative": "minus", "+": "plus", "1": "plus", "+1": "plus", "positive": "plus",
+    "RK4": "rk4", "RK45": "dop853", "midpoint": "implicit-midpoint",
+    "up": "rising", "down": "falling", "increasing": "rising", "decreasing": "falling",
+}  # fmt: skip
+
+#: Hints for words under ``targets`` that phigen writes in other ways.
+OTHER_TARGETS = {
+    **dict.fromkeys(
+        ("cpp", "c++", "C++", "fortran", "Fortran", "julia", "Julia", "matlab", "MATLAB", "rust", "Rust"),
+        "phigen build --binding NAME writes modules that call the C, where NAME is cpp, fortran, julia, matlab or rust",
+    ),
+    **dict.fromkeys(("fmu", "FMU"), "phigen build --fmu writes FMUs, which contain the C"),
+}
+
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause
 BSD-2-Clause-Patent BSD-3-Clause BSD-3-Clause-Clear BSD-4-Clause BSL-1.0 CC-BY-4.0 CC-BY-SA-4.0 CC0-1.0 CECILL-2.1
 CECILL-B CECILL-C ECL-2.0 EPL-1.0 EPL-2.0 EUPL-1.1 EUPL-1.2 GPL-2.0-only GPL-2.0-or-later GPL-3.0-only

@@ -26,7 +26,7 @@ from phigen.spec.model import (
     PullbackForm,
 )
 from phigen.spec.names import FAMILIES, FAMILY_HELP, FAMILY_NAME, SPEC_FUNCTIONS
-from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.problems import counted, intended, shown
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, neg
 from phigen.symbolic.neighbours import ENDS, minus
@@ -223,7 +223,9 @@ def _family(node: Scalar, sign: int, declared: Declarations) -> PoissonForm | No
     match = FAMILY_NAME.fullmatch(node.text)
     family, n = (match[1], int(match[2])) if match else ("", 0)
     if family not in FAMILIES:
-        guess = did_you_mean(node.text.split("(")[0], FAMILIES) or f"names are {FAMILY_HELP}"
+        name, _, rest = node.text.partition("(")
+        meant = intended(name, FAMILIES)
+        guess = f"did you mean '{meant}({rest}'?" if meant else f"names are {FAMILY_HELP}"
         return declared.reader.error(node, f"the Lie algebra {shown(node.text)} is not known", guess)
     least, dimension = FAMILIES[family]
     if n < least or (family == "sp" and n % 2):

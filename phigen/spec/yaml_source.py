@@ -16,6 +16,7 @@ from phigen.errors import Location
 from phigen.spec import limits
 from phigen.spec.problems import Problems, shown
 from phigen.spec.quoting import needs_quotes, quoted
+from phigen.spec.syntax_hints import syntax_hint
 
 
 @dataclass
@@ -205,15 +206,15 @@ class _Builder:
     def syntax_error(self, error: Any) -> Exception:
         mark = error.problem_mark or error.context_mark
         # If parsing fails at the end of the file, the message names the start of the unfinished list or mapping, which
-        # is more helpful.
-        if error.context_mark and mark.index >= len(self.text):
+        # is more helpful. The parser notices a key without a colon only in a later line.
+        if error.context_mark and (mark.index >= len(self.text) or error.context == "while scanning a simple key"):
             mark = error.context_mark
         location = self.place(mark) if mark else Location(1, 1, self.problems.file)
         what = " ".join(part for part in (error.context, error.problem) if part)
-        hint = "put expressions and texts with special characters between quotes"
-        if "\\t" in what or "'\t'" in what:
-            hint = "indent with spaces, not with tabs"
-        line = self.text.split("\n")[location.line - 1]
+        lines = self.text.split("\n")
+        opening = (error.context_mark.line + 1, error.context_mark.column + 1) if error.context_mark else None
+        hint = syntax_hint(error.context or "", error.problem or "", opening, (location.line, location.column), lines)
+        line = lines[location.line - 1]
         if needs_quotes(line, location.column - 1):
             self.problems.forget(location.line)  # earlier errors of this line follow from the missing quotes
             what = "inside { } and [ ], write what contains [ ] between quotes"

@@ -159,8 +159,11 @@ def averages(
     Rows from the time ``after`` on are averaged. Standard errors come from at least ``blocks`` blocks. ``phigen run``
     and sweeps take ``after`` and ``blocks`` from the setting ``average:`` of a run. A trajectory does not contain this
     setting, so both values must be passed to obtain the numbers that ``phigen run`` prints. Observables of lattices
-    with a value at each site are left out.
+    with a value at each site are left out. Raises ValueError if no row is at or after the time ``after``.
     """
+    end, sign = float(trajectory.t[-1]), -1 if trajectory.h < 0 else 1
+    if after is not None and not sign * after <= sign * end:
+        raise ValueError(f"after = {after:g} is not before the end of the trajectory, t = {end:g}")
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
     columns = {name: values for name, values in column_values.items() if np.ndim(values) == 1}
     running = Averages(len(columns), after=after, backwards=trajectory.h < 0, blocks=blocks)

@@ -615,6 +615,11 @@ REFUSED = {
 }
 
 
+def test_a_refusal_without_an_algebra_names_the_alternative():
+    with pytest.raises(SpecError, match="make a quaternion part of the coordinates, as the spec quaternion_top does"):
+        compiled_text(next(iter(REFUSED)))
+
+
 @pytest.mark.parametrize(
     ("text", "message"), REFUSED.items(), ids=["no algebra", "no rotations", "no element", "part", "forces", "monitor"]
 )

@@ -58,6 +58,12 @@ def test_mistakes_in_a_box_are_reported_at_their_place(tmp_path: Path, box: str,
     assert (result.exit_code, message in result.stderr) == (1, True), result.stderr
 
 
+def test_boxes_and_compared_steps_are_stages(tmp_path: Path) -> None:
+    listed = phigen("pendulum", "-v", "-o", tmp_path, "--samples", 2).stderr.splitlines()
+    assert "pendulum: boxes of the certificate" in listed
+    assert "pendulum: steps compared with the exact map, 0 of 2" in listed
+
+
 SPEC = """phigen: 1
 name: swing
 coordinates: [q, p]

@@ -101,6 +101,19 @@ def test_averages_from_a_time_after_the_end_are_refused(end, message):
     assert float(phigen.spec.loads(text.replace("AFTER", "1.5")).runs["r"].average.after) == 1.5
 
 
+@pytest.mark.parametrize("h", [0.1, -0.1])
+def test_averages_of_a_trajectory_from_a_time_after_its_end_are_refused(h):
+    text = (
+        "phigen: 1\nname: o\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2 + q**2\n"
+        "observables: {o: q*p}\n"
+    )
+    trajectory = phigen.compile(phigen.spec.loads(text), target="numpy").integrate([1, 0], h=h, steps=20)
+    end = trajectory.t[-1]
+    with pytest.raises(ValueError, match=f"after = {1.5 * end:g} is not before the end of the trajectory, t = {end:g}"):
+        phigen.averages(trajectory, after=1.5 * end)
+    assert phigen.averages(trajectory, after=end)["o"].mean == trajectory.observables["o"][-1]
+
+
 @pytest.mark.parametrize(("a", "resolved"), [(0.0, True), (0.9, True), (0.999, False)])
 def test_blocks_tell_whether_they_are_longer_than_the_correlation_time(a, resolved):
     """A block of 128 rows is longer than the integrated correlation times of 0.5 and 9.5 rows, and shorter than the one

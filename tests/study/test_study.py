@@ -125,12 +125,19 @@ def test_turns_are_counted_across_pieces_of_a_run():
         (0.01, 3.0, "relative", 0.01),
         (1e-16, 3.0, "of its terms", 3.0),
         (0.0, 0.0, "absolute", 1.0),
-        (math.nan, math.nan, "absolute", 1.0),
+        (math.nan, math.nan, "no value at the start", 1.0),
+        (math.inf, 2.0, "no value at the start", 1.0),
     ],
 )
 def test_errors_are_relative_to_the_value_at_the_start_or_to_the_terms_that_cancel_there(value, terms, kind, size):
     unit = conservation.unit_of(value, terms)
     assert (unit.kind, unit.size) == (kind, size)
+
+
+def test_an_energy_without_a_value_at_the_start_is_not_said_to_be_zero_there():
+    q = symbol("q")
+    (unit,) = conservation.units([q - call("log", q)], ["q"], {}, np.zeros(1))
+    assert conservation.stated({"energy": unit}) == "Errors of energy are unknown, since H has no value at the start."
 
 
 @pytest.mark.parametrize("constant", [0, 5])
