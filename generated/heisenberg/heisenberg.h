@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 72090d2918c7898042eb07435f67f6b441ee45864551318c2c0854ea3e467bca
+ * body-sha256: d50ebf6caf6111d6a9d05fbf3175d9bb076b2b63ca89af99ada7b1e68c633857
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -14,7 +14,7 @@ extern "C" {
 #define heisenberg_ORDER 2
 #define heisenberg_CASIMIRS 1 /* C */
 #define heisenberg_PHIGEN_VERSION "0.1.0"
-#define heisenberg_SPEC_SHA256 "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
+#define heisenberg_SPEC_SHA256 "7921ad0b2dfe94f16a5ca9b3ad035efb07fc8c8b5906b0ced5d71cbbdbeb56d4"
 
 typedef struct {
     double J;        /* default 1.0 */

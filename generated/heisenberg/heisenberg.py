@@ -6,11 +6,11 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0980b65fb7066688ba82fe9fca4c1f814950c4af6c930247e03298eb68da615c
+# body-sha256: b75c36fbec9e370d78136406133cb5318138c0a1f78665b150579031fc019865
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
+SPEC_SHA256 = "7921ad0b2dfe94f16a5ca9b3ad035efb07fc8c8b5906b0ced5d71cbbdbeb56d4"
 DIM = 3
 ORDER = 2
 AXES = ("i", "j", "k",)

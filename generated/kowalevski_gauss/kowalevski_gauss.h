@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a2071212efaae3115e83cfdb2ae8c4e6302afd56bba20e3229cab539d26c8c1a
+ * body-sha256: 2a02e6f45fd82c62610da0b13f4dbd793fc85d4b1bdbfe6be2c12a559c722bd7
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -13,7 +13,7 @@ extern "C" {
 #define kowalevski_gauss_ORDER 16   /* order of the method */
 #define kowalevski_gauss_CASIMIRS 2 /* Casimirs: A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
-#define kowalevski_gauss_SPEC_SHA256 "bdf54c6d3cfbb5eec085af6ef97624c185d4e5c3d6c2052a92a705496cdfa343"
+#define kowalevski_gauss_SPEC_SHA256 "7363dc409595ab651edd1c499770a65a43237d29236ead2b2522363a4cf0bd33"
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* number of coefficients: functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* number of stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* number of entries of an array over the stages */

@@ -6,11 +6,11 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 85df9e066021ca64b063945ee4e32b003e34a5b3ee01d30edeb4b2b33fa42436
+# body-sha256: 048da9e37b2c7d354447de4ee6c226a375c938837de6638b95d55537e591a749
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "bdf54c6d3cfbb5eec085af6ef97624c185d4e5c3d6c2052a92a705496cdfa343"
+SPEC_SHA256 = "7363dc409595ab651edd1c499770a65a43237d29236ead2b2522363a4cf0bd33"
 DIM = 6
 ORDER = 16
 COORDINATES = ("P1", "P2", "P3", "G1", "G2", "G3",)

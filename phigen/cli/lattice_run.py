@@ -330,4 +330,5 @@ def _print(
         out(f"  {line}")
     out(f"  {stated(units)}")
     if BALANCE in errors:
-        out("  The energy balance is H − ∫ dH/dt dt, integrated over all steps by a rule of order 8.")
+        power = "(∂H/∂t + the power of the forces)" if spec.forces else "∂H/∂t"
+        out(f"  The energy balance is H − ∫ {power} dt, integrated over all steps by a rule of order 8.")
