@@ -10,7 +10,10 @@ from phigen.cli.interruption import Stop
 
 @contextmanager
 def interrupted(pieces, steps=16):
-    """Interrupt each run of the command line after ``pieces`` blocks of at most ``steps`` steps."""
+    """Interrupt each run of the command line after ``pieces`` pieces.
+
+    A piece has at most ``steps`` steps, or as many as there are between two rows.
+    """
     asked = itertools.count()
 
     class Later(Stop):

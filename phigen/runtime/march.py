@@ -20,6 +20,10 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 
+#: Largest number of steps that one call makes. A call takes some microseconds more than its steps, so calls of a few
+#: hundred cheap steps would cost time; during a call, a run cannot be interrupted.
+_CALL_STEPS = 1 << 12
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -57,7 +61,8 @@ def march(
     """Advance a session until it has made ``steps`` steps of size h. Yield every ``stride``-th state and the last, in
     pieces.
 
-    The length of a piece depends on the speed of the machine; the rows do not. ``is_started`` is true if the initial
+    The length of a piece depends on the speed of the machine; the rows do not, since pieces do not divide the calls of
+    `_call_end`. ``is_started`` is true if the initial
     state was yielded before. ``goes_on`` is true if a shorter step will follow. Then the state after the last whole
     step is yielded only if it is a ``stride``-th state. ``see_tangent`` receives the derivative (DIM, DIM) of each
     step. If a step fails, `BackendError` is raised after a piece that ends with the state before that step.
@@ -72,7 +77,7 @@ def march(
         failure = None
         try:
             for number, states, marks, met in _states(
-                session, h, min(steps, session.steps + size), stride, finder, see_tangent
+                session, h, steps, min(steps, session.steps + size), stride, finder, see_tangent
             ):
                 crossings += met
                 marked_states = zip(states, marks, strict=False)
@@ -180,16 +185,30 @@ def _session_at_time(
     return row_session, session.steps + size / h
 
 
+def _call_end(steps_done: int, stride: int, steps: int) -> int:
+    """Return the number of steps after the call that follows ``steps_done`` steps, in a run of ``steps`` steps.
+
+    The C solves blocks of successive steps together, and the number of steps in a call decides which steps form a
+    block. So the rounding errors of the states depend on the ends of calls. These ends are functions of the step
+    numbers only: multiples of ``stride``, and points between them at distances of `_CALL_STEPS` steps.
+    """
+    since_row = steps_done % stride
+    return min(steps, steps_done + min(stride - since_row, _CALL_STEPS - since_row % _CALL_STEPS))
+
+
 def _states(
     session: Session,
     h: float,
+    steps: int,
     target: int,
     stride: int,
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
-    """Advance a session until it has made ``target`` steps. For each block, yield (number, states, marks,
-    crossings).
+    """Advance a session until it has made at least ``target`` steps of a run of ``steps`` steps. For each block, yield
+    (number, states, marks, crossings).
+
+    There are more than ``target`` steps only if `_call_end` requires it.
 
     The number is the step number of the first state. There is one `Mark` for each state. With a finder or with
     ``see_tangent``, the state after each step is yielded. Otherwise only the states after every ``stride``-th step and
@@ -211,7 +230,7 @@ def _states(
         return
     steps_done = session.steps
     while steps_done < target:
-        count = 1 if see_tangent else min(target, steps_done + stride - steps_done % stride) - steps_done
+        count = 1 if see_tangent else _call_end(steps_done, stride, steps) - steps_done
         if see_tangent:
             move()
         else:
