@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: e207c6d430ae474d3066663124302de9b064c389d5b9375b541b10f27e7aa71e
+ * body-sha256: e8339a322ac13545e452775d7821296b271f8f0fec30118040945c8bea06a093
  */
 #include "duffing.h"
 #include <float.h>
@@ -229,7 +229,7 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 }
 
 #define duffing_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of a step longer than PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f417ae7358eaf8cabbbe874425ad427e00a79ef5bb7d4993fa438eb840c6ee11
+ * body-sha256: 1a61f3b1bce90c1c8566620b71364285f663c6cff5800aa8bc20f90030aec69c
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -186,7 +186,7 @@ const SHRINKING = 0.25;
 
 /** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of steps beyond PLAUSIBLE. */
+/** Largest relative energy change of a step longer than PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

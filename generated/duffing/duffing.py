@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1aecafd2a5045aa896abec633e663bf7aafb3f15dc88601b37f492ae4ad2a622
+# body-sha256: a37b76460064f2377bddc2c0dd76778c74e47efd78b463c5d2769609ee26108f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -215,7 +215,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):

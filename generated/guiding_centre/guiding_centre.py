@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4a44afda91cfc127a7defcfb996597e8c7a950c2f35bdab41437838937a03fed
+# body-sha256: dec8cdf9d4f506f56845b2ce5821954d8b28b31be19dfa9360990382c8aba649
 import numpy as np
 
 VERSION = "0.1.0"
@@ -470,7 +470,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: f021d70d00dd5376f7ae743ecc198d1201228bf359e903d7ee32c5796bfa0e74
+ * body-sha256: 0ab5c6ef4b55a99399785e3e684a9fce5c26ea82687763c64373d2a4e6c87fe7
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -331,8 +331,8 @@ static void kowalevski_gauss_stage_field_lanes(const double coef[1], const doubl
     }
 }
 
-/* Transform derivatives `k` from the unknowns of a step that ends at `z` to those of the next step, in all
-   lanes. */
+/* Replace the derivatives `k` of the unknowns of a step that ends at `z` by derivatives for the next step, in
+   all lanes. */
 static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double x[6], const double z[8],
     kowalevski_gauss_lanes k[restrict 8], kowalevski_gauss_lanes seen[restrict 8])
 {
@@ -806,7 +806,8 @@ static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size
             ? x[i] : (double)NAN;
 }
 
-/* Make the remaining steps of member m by itself; `done` steps are made, `status` is the present status. */
+/* Make the remaining steps of member m alone; `done` steps are already made. `status` is the present
+   status. */
 static kowalevski_gauss_status kowalevski_gauss_end_member(const kowalevski_gauss_members *all, size_t m,
     size_t done, kowalevski_gauss_solver *s, kowalevski_gauss_status status)
 {

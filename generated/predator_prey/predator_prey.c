@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 70d08ae7caa3884fc5af1d351fd932ca9db17d1369962dbfb701eb60b897a88c
+ * body-sha256: e097b2d0e86b555341251dedd252d87109f6dc43ccd1c2008e7896f930009dc7
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -202,8 +202,9 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
+#define predator_prey_PLAUSIBLE 1.5 /* accepted length of a step, relative to |x| + |h dx/dt| */
+/* largest relative energy change of a step longer than PLAUSIBLE */
+#define predator_prey_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

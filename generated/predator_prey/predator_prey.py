@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 189e78ee347cb8d43f13df46cc0665aeaecbc1f8eac10209cfb7a8032d213004
+# body-sha256: 8e634df7cc2774361600376393357f04408405a7aa5c991c5b0d3a286fd3fc68
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,7 +209,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):

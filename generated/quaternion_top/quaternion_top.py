@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 566aa5d4c5bc71da0cc70db9f2aeacaa019be2e11ed05abc8d019c88a60a5df1
+# body-sha256: 19605d138c2eb2dc653ff88f172a295f51acbd9bac04ba269174496410af9be6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -808,7 +808,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):

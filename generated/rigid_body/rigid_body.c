@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 4ef7168f11b2e1c755680937084a2f03e5b5a180683df5739fa0532035d3661d
+ * body-sha256: 416864f8e7319206d8dc51524c5c5052b837d4b237c458f51a923c4bd25cefdf
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -634,7 +634,7 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
 }
 
 #define rigid_body_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of steps beyond PLAUSIBLE */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of a step longer than PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -1355,10 +1355,10 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* Advance x + carry through the steps of a block in order. By its linear model, a step adds increment - gain
-   * residual to x, where residual is the residual of the equation for y. The residual of the next step
-   follows from the residual of the present step, without the new x. `most` receives the largest correction of
-   y in each lane. */
+/* Advance x + carry through the steps of a block in order. In the linear model, a step adds `increment` -
+   `gain` * r to x, where r is the residual of the equation for y. The residual of the next step follows from
+   the residual of the present step, without the new x. `most` receives the largest correction of y in each
+   lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
@@ -1726,7 +1726,8 @@ static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t
             : (double)NAN;
 }
 
-/* Make the remaining steps of member m by itself; `done` steps are made, `status` is the present status. */
+/* Make the remaining steps of member m alone; `done` steps are already made. `status` is the present
+   status. */
 static rigid_body_status rigid_body_end_member(const rigid_body_members *all, size_t m, size_t done,
     rigid_body_solver *s, rigid_body_status status)
 {

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2c4b2c5a27b8bf893d8f4e8f8dc895544a1dd67938ad443222557a83b4e0bc0a
+ * body-sha256: a72c813b04826df838443114686312b2224c69e47f764b20b557e42bfc16983a
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -465,7 +465,7 @@ const SHRINKING = 0.25;
 
 /** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of steps beyond PLAUSIBLE. */
+/** Largest relative energy change of a step longer than PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */
@@ -1130,7 +1130,7 @@ function errorOnLine(difference, t) {
 
 /**
  * Return the change of gauge[c] that minimises the error, as a multiple of `width`. The minimum is searched
- * on a grid, and then on finer grids around the best point.
+ * for on a grid, and then on finer grids around the best point.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cfac568cbd778ac2e78a81c04091644fc08b8137109e1198adf3cc4d7ffa50bf
+# body-sha256: 921916fef01447f573f8e7e140289c6f3742b94b69197c40d7fc9116eacac38d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -461,7 +461,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):
@@ -583,8 +583,8 @@ def _line(error_of, gauge, c, width):
 def _least_on_line(difference, size):
     """Return the change of a factor of the gauge that minimises the error, as a multiple of `width` (see _line).
 
-    `difference` and `size` are what _line returns. The minimum is searched on a grid, and then on finer grids around
-    the best point.
+    `difference` and `size` are what _line returns. The minimum is searched for on a grid, and then on finer grids
+    around the best point.
     """
 
     def value(t):

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dba8434fa15b72d7030f68d9d2b13e2052603d701f77f3cbe7bdd39fa8cb7cde
+ * body-sha256: a8855e141effebf5c1a02c87846e23a9a27757ef4c8bba86775d563041305182
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -284,7 +284,7 @@ const SHRINKING = 0.25;
 
 /** Accepted length of a step, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of steps beyond PLAUSIBLE. */
+/** Largest relative energy change of a step longer than PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 701eefbd3daf90121fcb8fc56d4951048e854e1dd032dfb64d0edb486a90a201
+# body-sha256: c48a4eeaae6b42793600cff95e50259ecfef4f3f95a1440d02d1892e440adfc9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -303,7 +303,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of steps beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
 
 
 def _plausible(stage, x, end):

@@ -139,7 +139,7 @@ class PlausibilityPolicy(Policy):
     """
 
     plausible: float = number(1.5, "accepted length of a step, relative to |x| + |h dx/dt|")
-    max_energy_change: float = number(0.5, "largest relative energy change of steps beyond PLAUSIBLE")
+    max_energy_change: float = number(0.5, "largest relative energy change of a step longer than PLAUSIBLE")
 
 
 @dataclass(frozen=True)

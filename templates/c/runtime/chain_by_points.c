@@ -4,9 +4,9 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Advance x + carry through the steps of a block in order. By its linear model, a step adds increment - gain * residual
-   to x, where residual is the residual of the equation for y. The residual of the next step follows from the residual
-   of the present step, without the new x. `most` receives the largest correction of y in each lane. */
+/* Advance x + carry through the steps of a block in order. In the linear model, a step adds `increment` - `gain` * r to
+   x, where r is the residual of the equation for y. The residual of the next step follows from the residual of
+   the present step, without the new x. `most` receives the largest correction of y in each lane. */
 static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
     phi_lanes most)
 {

@@ -92,8 +92,8 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 #endif
 }
 
-/* Correct the points y of all stages by their residuals, and advance x + carry through all steps. By its linear model,
-   a stage adds increment - gain * residual to x. The residual of the next stage follows from the residual of the
+/* Correct the points y of all stages by their residuals, and advance x + carry through all steps. In the linear
+   model, a stage adds `increment` - `gain` * r to x, where r is its residual. The residual of the next stage follows from the residual of the
    present stage, without the new x. `most` receives the largest correction of y in each lane. */
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)

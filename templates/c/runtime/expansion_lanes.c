@@ -82,7 +82,7 @@ static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[re
     }
 }
 
-/* Add the terms of the odd order k and of the even order k + 1 to the sums; returns the largest size over the lanes. */
+/* Add the terms of the orders k and k + 1 to the sums; k is odd. Returns the largest size over the lanes. */
 static double phi_add_terms(phi_expansion *e, int k)
 {
     phi_lanes size = { 0.0 };
@@ -170,7 +170,7 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
     phi_begin(coef, e, m);
 }
 
-/* Find the middles y + middle of the paths whose mean is y, by iteration. Each iteration gains some digits, and sums no
+/* Find the middles of the paths whose mean is y, as y + `middle`, by iteration. Each iteration gains some digits, and sums no
    more terms than these digits need; the last expansion can be extended. `middle` becomes infinite in lanes that do not
    converge. */
 static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
@@ -221,7 +221,7 @@ static void phi_vary_order(phi_expansion *e, int k)
     for (int j = 0; j < k; ++j) phi_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. `size` receives the
+/* Add the terms of the orders k and k + 1 to the sums for the derivatives; k is odd. `size` receives the
    magnitudes of these terms; for derivatives by p, they are relative to the terms of order 1. */
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {

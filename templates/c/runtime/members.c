@@ -67,7 +67,7 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
 
 #include "members_attitudes.c"
 
-/* Make the remaining steps of member m by itself; `done` steps are made, `status` is the present status. */
+/* Make the remaining steps of member m alone; `done` steps are already made. `status` is the present status. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {
     while (done < all->steps) {

@@ -60,7 +60,7 @@ function errorOnLine(difference, t) {
 
 /**
  * Return the change of gauge[c] that minimises the error, as a multiple of `width`. The minimum is searched
- * on a grid, and then on finer grids around the best point.
+ * for on a grid, and then on finer grids around the best point.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
