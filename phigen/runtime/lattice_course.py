@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from phigen.runtime.arguments import Beginning
-from phigen.runtime.interface import Clock, Floats
+from phigen.runtime.interface import BackendError, Clock, Floats
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed
 
@@ -87,10 +87,17 @@ class LatticeCourse:
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
         sites = self.sites  # started before h changes, since its start may repeat earlier steps
-        if h != self._clock.h:
+        earlier_h = self._clock.h
+        if h != earlier_h:
             self._anchor = {}
             self._clock.set_step(h, self.steps)
-        sites.advance(h, steps)
+        try:
+            sites.advance(h, steps)
+        except BackendError:
+            if self.steps == self._clock.counted:
+                # No step of size h was made. With this size, copies might not even start.
+                self._clock.h = earlier_h
+            raise
 
     def branch(self) -> LatticeCourse:
         """Return an independent copy. Until its first use, the copy consists of saved arrays, which several copies

@@ -154,6 +154,35 @@ noise: {bath: {hamiltonian: q, amplitude: 0.1}}
 """
 
 
+#: A driven chain; steps that are far too large have coefficients that are not finite.
+GROWING = """\
+phigen: 1
+name: growing
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+time: t
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**4/4 + p*q/3 + q*q[i+1]/6 + q*cos(t)/5
+order: 2
+scheme: splitting
+"""
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_copies_and_pickles_go_on_after_a_failed_step(target):
+    solver = phigen.compile(phigen.spec.loads(GROWING), target)
+    session = solver.session(np.linspace(-0.5, 0.7, 10).reshape(2, 5), t0=0.4)
+    for _ in range(2):
+        with pytest.raises(StepError):
+            session.step(1e6)
+        others = [session.copy(), pickle.loads(pickle.dumps(session))]
+        session.step(0.1, 2)
+        for other in others:
+            np.testing.assert_array_equal(other.step(0.1, 2).x, session.x)
+            assert other.t == session.t
+    assert session.t == pytest.approx(0.8)
+
+
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_branches_share_states_and_keep_the_bits(target):
     solver = phigen.compile(phigen.spec.loads(CHAIN_WITH_NOISE), target=target)
