@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SPEC, RUN = "lotka_volterra", "blow_up"
 
-#: Orders of the two solvers that are compared: order 2, which the paper uses, and order 8.
+#: Orders of the two solvers of phigen in the table. The paper (arXiv:2303.15883) uses order 2.
 ORDERS = (2, 8)
 CLASSICAL = "rk2"
 
@@ -31,8 +31,8 @@ _ROWS_AT = (0.1, 0.2, 0.24, 0.25, 0.254, 0.255)
 @verbosity
 @pass_console
 def command(console: Console, target: str) -> None:
-    """Compile the paper's Lotka–Volterra system, run it until shortly before the singularity of the solution, and print
-    the errors of the solvers.
+    """Compile a Lotka–Volterra system, run it until shortly before the singularity of the solution, and print the
+    errors of the solvers.
 
     The solution has a closed form and becomes infinite in finite time. The table compares two solvers of phigen and
     RK2, all with one step size. It lists the distances from the closed form, and the errors of the Casimir.

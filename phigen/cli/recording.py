@@ -173,7 +173,7 @@ class Recorder:
             raise MismatchError(f"cannot resume: {error}") from None
 
     def see(self, rows_piece: Piece) -> None:
-        """Record the rows and the crossings of a part of the integration."""
+        """Record the rows of one piece of the integration, and its crossings of the section."""
         experiment, monitored = self.experiment, self.solver.interface.monitored
         if len(rows_piece.numbers):
             self.number = float(rows_piece.numbers[-1])

@@ -96,7 +96,9 @@ def command(
 
 
 def write_panel(spec: Spec, name: str | None, output: str | None, measuring: bool, console: Console) -> None:
-    """Write the page with the live panel of a run, or print it. Raises `NoPanelError`."""
+    """Write a page on which the run is computed in the browser. If ``output`` is "-", print the page instead. Raises
+    `NoPanelError` if phigen cannot make this page for the spec.
+    """
     from phigen.compiler import compile_proved
     from phigen.report.page import with_origin
     from phigen.report.panel import panel_page

@@ -75,8 +75,11 @@ def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, 
 def _integrated(
     material: Material, solver: Solver, experiment: Experiment, lyapunov: bool, console: Console
 ) -> tuple[Material, list[PhigenError]]:
-    """Return the content with the trajectories of the solver and of the methods that the run lists under
-    ``compare``."""
+    """Integrate the run by the solver, and by the methods for comparison.
+
+    Return ``material`` with the trajectories. The second result is a list with the error of the solver if the run
+    failed, else [].
+    """
     from phigen.cli.recording import Files, Recorder, compared
     from phigen.cli.run_summary import steps_text
     from phigen.study.classical import COMPARED

@@ -1,4 +1,4 @@
-"""``phigen reproduce paper``: the figures of the paper, with measured numbers."""
+"""``phigen reproduce paper``: the figures of the paper arXiv:2303.15883, with measured numbers."""
 
 from __future__ import annotations
 

@@ -129,7 +129,10 @@ def _time_shown(average: Average) -> str:
 
 
 def _print_means(recorder: Recorder) -> None:
-    """Print mean and standard error over all members at the end of the run."""
+    """Print the mean and the standard error of each coordinate and of the energy.
+
+    The means are those of all members, at the end of the run.
+    """
     run, means = recorder.experiment.run, recorder.means()
     out(f"\n  means over {run.members} members at t = {recorder.time:.9g}")
     for line in table([[name, f"{mean:.6g}", f"± {error:.1g}"] for name, (mean, error) in means.items()], right=[1]):
@@ -182,7 +185,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
 def described_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> dict[str, Any]:
     """Return the time averages by the names of observables, as data for JSON.
 
-    ``observables`` selects some of them; by default all are returned.
+    If ``observables`` is not empty, only the averages of these observables are returned.
     """
     from dataclasses import asdict
 

@@ -1,4 +1,4 @@
-"""Summary of ``phigen tune``: a table with lines to paste, or data for JSON."""
+"""Summary of ``phigen tune``: a table, and lines of YAML that users paste into the spec; or data for JSON."""
 
 from __future__ import annotations
 
