@@ -64,10 +64,10 @@ class Unit:
         return ABSOLUTE if self.kind in (ABSOLUTE, UNDEFINED) else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """Return the errors of a quantity along a trajectory, in this unit.
+        """Return the error |value − ``start``|/``size`` for each of the ``values``.
 
-        ``values`` has the values of the quantity along the trajectory, and ``start`` is its value at the start.
-        ``values`` and the result have the shape (rows,).
+        ``values`` has the values of a quantity along a trajectory, and ``start`` is its value at the start. ``values``
+        and the result have the shape (rows,).
         """
         with np.errstate(invalid="ignore"):  # values may be infinite or NaN, without warnings
             errors: Floats = np.abs(values - start) / self.size
@@ -87,10 +87,9 @@ def units(
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
-    """Return the units in which errors of the energy and of the Casimirs along a trajectory are measured, by
-    name.
+    """Return a map: `ENERGY` or the name of a Casimir → the unit for errors of this quantity.
 
-    The trajectory begins at the state ``start`` of shape (DIM,).
+    The errors are those along a trajectory that begins at the state ``start`` of shape (DIM,).
     """
     quantities = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))

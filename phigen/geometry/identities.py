@@ -14,11 +14,11 @@ from phigen.symbolic.numeric import DomainError, evaluate_precisely, evaluate_wi
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
-#: Largest degree of polynomials that are recognised. The entries of constant, linear and log-canonical tensors π have
-#: degree ≤ 2.
+#: Largest degree of the polynomials that `polynomial_by_identity` finds. The entries of constant, linear and
+#: log-canonical tensors π have degree ≤ 2.
 DEGREE = 2
-#: Each pair (a, b) stands for the point (a, a + b, a + 2b, …). The function is expanded in a Taylor polynomial at the
-#: first of these points where this is possible. Many functions have rational values at the first two points.
+#: Each pair (a, b) stands for the point (a, a + b, a + 2b, …). `_expansion` takes the first of these points at which
+#: the expression has a Taylor polynomial. Many functions have rational values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
 #: An expression is evaluated at points of a line, to exclude functions that are not polynomials. If it has no value at
 #: one of the points, another line is tried; this is the largest number of lines.

@@ -57,7 +57,7 @@ class LieAlgebra:
 
     @cached_property
     def field(self) -> Field:
-        """The field that contains the structure constants."""
+        """The smallest field, in the sense of algebra, that contains the structure constants."""
         return Field(c for row in self.constants.values() for c in row.values())
 
     def poisson(self, coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:
