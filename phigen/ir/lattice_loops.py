@@ -1,9 +1,9 @@
 """Builder of the loops of a lattice: functions that evaluate kernels of a site in loops over sites, bonds or
 pairs.
 
-`LatticeLoops.meaning` defines, for all targets, which value each symbol of a kernel stands for. The functions are on
-the level of sites, which `phigen.ir.nodes` explains. Their stores contain whole expression graphs, which the pass
-`phigen.ir.passes.temporaries` converts to statements.
+`LatticeLoops.meaning` defines, for all targets, which value each symbol of a kernel stands for. The values that the
+functions store are whole expression graphs. Two passes follow. `phigen.ir.passes.temporaries` converts the graphs to
+statements. The lowering of the target converts loops over sites to loops over elements of arrays.
 """
 
 from __future__ import annotations

@@ -70,8 +70,8 @@ class LatticeLaunches:
     others: Mapping[str, SiteLaunch] = field(default_factory=dict)
     arrays: tuple[str, ...] = ()
     neighbours: tuple[tuple[int, ...], ...] = ()  # offsets of the sites whose fields kernels read
-    # for each weight of a term near open ends, and each axis: the least and the largest offset at which the term reads
-    # values
+    # for each weight (see `phigen.ir.passes.open_ends`), and each axis: the least and the largest offset at which the
+    # term with this weight reads values
     bounds: tuple[tuple[tuple[int, int], ...], ...] = ()
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()

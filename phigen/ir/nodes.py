@@ -54,7 +54,8 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Vector:
-    """Array of reals, or of SIMD vectors of reals if ``lanes``; a matrix if it has ``rows``.
+    """Array of real numbers. With ``lanes``, its elements are SIMD vectors instead of numbers. With ``rows``, the array
+    is a matrix with this number of rows.
 
     A parameter of this type is an address, and its ``length`` may be unknown (None). ``constant`` and ``restricted``
     have the same meaning as in `Pointer`.

@@ -115,7 +115,9 @@ class PathFunctions:
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
-        """Return the statements that store the values of all nodes at one point m in the array ``e``."""
+        """Return the statements that evaluate the expression graph of the path at a point m. They store the values of
+        its nodes in the array ``e``.
+        """
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
@@ -206,14 +208,12 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
 
 
 def tangent_program(program: Program) -> Program:
-    """Return a copy of the program, with the coordinates of a tangent path: the state and its variation."""
+    """Return a copy of the program for tangent paths: its coordinates are the state and the variation of the state."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def adjoint_program(program: Program, path: PathAdjoint) -> Program:
-    """Return a copy of the program, with the coordinates of a path in the reverse pass: the state and all
-    cotangents.
-    """
+    """Return a copy of the program for paths in the reverse pass: its coordinates are the state and all cotangents."""
     names = program.coordinates
     bars = [
         *map(cotangent, names),
@@ -229,7 +229,7 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 class _LaneLayout(PathLayout):
     """The places of the values of a path in one SIMD lane. The record ``e`` has the values of all lanes.
 
-    Some series are needed only for the derivatives of the path. Their numbers follow those of the series of the path.
+    The last series are needed only for derivatives of the path. They have an array of their own.
     """
 
     def __init__(self, path: Recurrences) -> None:
@@ -287,7 +287,8 @@ class _LaneFunctions:
     path: PathFunctions
 
     def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
-        """Return the function that computes Taylor coefficients of order k ≥ 1, for the series in ``numbers``.
+        """Return the function that computes the Taylor coefficients of order k ≥ 1 of some of the series. ``numbers``
+        are the numbers of these series.
 
         The function first adds the products of coefficients of orders j and k − j for 0 < j < k, then the remaining
         terms, which may contain coefficients of order k.
@@ -376,7 +377,7 @@ def _of_order(
     return typed_function(name, doc, parameters, body if statements else (), _TYPES)
 
 
-#: Types of the parameters of functions in lanes.
+#: Type of each parameter of the functions that `lane_functions` returns.
 _TYPES: Mapping[str, ir.ParameterType] = {
     "coef": ir.Vector(None, lanes=True, restricted=True),
     "e": ir.RecordType("expansion", mutable=True),

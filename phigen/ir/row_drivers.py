@@ -56,17 +56,17 @@ class RowSegment:
 
     @property
     def near_ends(self) -> bool:
-        """Whether the calls differ between sites near open ends or seams and all other sites."""
+        """Whether there are separate calls for the sites near open ends or seams."""
         return divides(self.calls)
 
 
 @dataclass(frozen=True)
 class RowDrivers:
-    """Builder of the row drivers of a lattice.
+    """Builder of the row drivers of a lattice: functions of the C that process the row segments.
 
     ``halo`` is the number of sites in the halo on each side of a row. With ``may_be_empty``, there may be segments
-    without sites. With ``one_loop``, a driver has one loop over row segments, with a switch over the parts of H inside.
-    Otherwise the switch is outside, and each part has its own loop.
+    without sites. With ``one_loop``, a driver has one loop over row segments, and a switch inside the loop selects the
+    part of H. Otherwise the switch is outside, and each part has its own loop.
     """
 
     layout: RowLayout
@@ -129,7 +129,8 @@ class RowDrivers:
     def copied_ends(self, arrays: ir.Value, number: int | ir.Value, *, near_ends: bool = False) -> ir.Call:
         """Return the statement that copies the ends of the row of a field to the halo of this row.
 
-        ``number`` is the number of the field in ``arrays``. In lattices of several rows, the segment is a whole row.
+        ``number`` is the number of the field in ``arrays``. The last two arguments of the call are the bounds of the
+        row segment if the lattice is a single row. Otherwise they are the bounds of the whole row.
         """
         begin, stop = (BEGIN, STOP) if near_ends else (FROM, TO)
         swept = (begin, stop) if self.layout.single_row else (ir.Constant(0), LENGTH)
@@ -160,7 +161,7 @@ class RowDrivers:
 
 @dataclass(frozen=True)
 class _Driver:
-    """Builder of one row driver; the fields are options of `RowDrivers.driver`."""
+    """Builder of one row driver. `RowDrivers.driver` explains the fields, which are options of this method."""
 
     drivers: RowDrivers
     threads: int

@@ -199,8 +199,8 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the calls that set maxima and minima to their initial values ∓∞. The callers of the function set
-    sums to 0.
+    """Yield the calls that set maxima and minima to their initial values ∓∞. There are no calls for sums: the code that
+    calls the generated function sets sums to 0.
     """
     for s in loop.stores:
         if s.extreme:

@@ -61,8 +61,10 @@ def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
 def _part(
     reads: Sequence[ir.Statement], chunk: Sequence[ir.Statement], crossing: dict[str, Symbol]
 ) -> list[ir.Statement]:
-    """Return the statements of one part. ``crossing`` has the values that several parts share, each with its entry of
-    the workspace.
+    """Return the body of one part of the divided function.
+
+    ``chunk`` has the statements that belong to the part. ``crossing`` maps each temporary that several parts use to its
+    entry of the workspace array.
     """
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:

@@ -1,7 +1,7 @@
 """Separate loops for sites near open ends and for all other sites, where no term reaches beyond an end.
 
-The pass applies to functions on the level of sites. It comes before `phigen.ir.passes.temporaries`, so values are
-expression graphs.
+The pass applies to functions with loops over sites, before their lowering. It also comes before
+`phigen.ir.passes.temporaries`, so that values are still expression graphs.
 """
 
 from __future__ import annotations

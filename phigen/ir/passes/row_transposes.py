@@ -121,8 +121,10 @@ _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
 def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
-    """Return two things: a map from the number of an array to the contribution to other sites that is stored in it, and
-    the statements that store all results of a site.
+    """Return a map and a list of statements.
+
+    The map says what the generated function stores for other sites: number of an array → value that is stored in this
+    array. The statements store all results of a site.
     """
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
@@ -228,10 +230,11 @@ def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) ->
 
 @dataclass(frozen=True)
 class BondTranspose:
-    """The transpose of a function for sums over bonds or pairs, for the sites that lie at the end ``end`` of bonds.
+    """The transpose of a function that computes sums over bonds or pairs. There is one transpose for each end of the
+    bonds: ``end`` is "a" or "b".
 
-    The cotangents of the ``count`` sums are in the arrays from number ``sums_from`` on. Parameters at bonds that are
-    ``oriented`` have the opposite sign for the site at the end b.
+    The cotangents of the ``count`` sums are in the arrays from number ``sums_from`` on. ``oriented`` are the names of
+    parameters at bonds that have the opposite sign for the site at the end b.
     """
 
     function: ir.Function

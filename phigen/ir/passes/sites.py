@@ -1,4 +1,4 @@
-"""Sites in loops: the variables that hold indices of sites, indices in arrays of all sites, and the loop over pairs."""
+"""Code for sites in loops: variables for indices, the index of a site's value in an array, and the loop over pairs."""
 
 from __future__ import annotations
 

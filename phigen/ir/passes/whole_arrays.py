@@ -93,7 +93,10 @@ class WholeArrays:
         return replace(function, parameters=("parameters", "x", *varied, "sites"), body=(*body, ir.Return(OUT)))
 
     def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
-        """Return a single function that adds the sums of several functions, such as those for the two ends of bonds."""
+        """Combine ``functions`` into one function, whose result is the sum of their results.
+
+        Each of the ``functions`` computes sums over bonds or pairs; for bonds there may be one function for each end.
+        """
         body: list[ir.Statement] = []
         for function in functions:
             loop = function.loop
@@ -140,7 +143,10 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
-        """Return the transpose ``name`` of functions for sums: from cotangents of sums to cotangents of the state."""
+        """Return the transpose of ``functions``, which compute sums, as one function with the name ``name``.
+
+        The result maps cotangents of the sums to cotangents of the state.
+        """
         end = "here" if self.lattice.step.others.graph else AXIS.text
         body: list[ir.Statement] = []
         for function in functions:
