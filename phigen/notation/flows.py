@@ -61,7 +61,7 @@ def _place(matrix: MatrixExponential, k: int) -> str:
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """Return the Hamiltonian or the force whose flow this is, as pairs (name, expression).
+    """Return the Hamiltonian or the force of ``flow``, as pairs (name, expression).
 
     For a Hamiltonian there is one pair, with the name "". For a force there is a pair for each nonzero component, with
     the name of its coordinate.

@@ -88,7 +88,10 @@ def _flows(compilation: CompiledSplitting) -> list[str]:
 
 
 def _flow(compilation: CompiledSplitting, k: int) -> str:
-    """Return the LaTeX equations for part ``k`` of H, and for the coordinates after the time h of its flow."""
+    """Return the LaTeX equations that define part ``k`` of H and its flow.
+
+    The equations of the flow give the values of the coordinates after the time h.
+    """
     flow = compilation.splitting.flows[k - 1]
     new_values = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"

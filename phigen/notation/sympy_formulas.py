@@ -1,4 +1,6 @@
-"""Formulas of a method by series in sympy: H minus multiples of Casimirs, the maps α and β, the terms S_1 … S_k."""
+"""Formulas of the scheme ``series``, as expressions of sympy: H minus multiples of Casimirs, the maps α and β, and the
+terms S_1 … S_k.
+"""
 
 from __future__ import annotations
 

@@ -222,7 +222,7 @@ def _identifier(name: str, *, called: bool) -> Atom:
 
 
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
-    """Return a base with its index and exponent as atoms.
+    """Return the atoms of a base with an index, an exponent or both. Within an atom, no line breaks.
 
     A base that is a sum in parentheses may be broken. A power of e with a long exponent becomes exp(…), whose argument
     may be broken too.
