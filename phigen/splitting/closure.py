@@ -50,10 +50,10 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """Return the motion along a vector field.
+    """Return the equations of motion along a vector field.
 
-    For each coordinate that is not constant, the motion has linear differential equations if phigen finds them,
-    otherwise the time derivative.
+    For each coordinate that is not constant, the result has linear differential equations if phigen finds them.
+    Otherwise it has only the time derivative of the coordinate.
     """
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}

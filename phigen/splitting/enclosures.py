@@ -61,7 +61,10 @@ def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _error(a: NDArray[np.float64]) -> float:
-    """Return the largest error of an entry of exp(a) − 1, relative to the norm of this matrix, by ball arithmetic."""
+    """Return a bound for the errors of the matrix C that `exponential_less_one` computes for exp(a) − 1.
+
+    The bound is the largest |error of an entry|, divided by the norm of C. Ball arithmetic encloses the exact entries.
+    """
     computed, precision = exponential_less_one(a), ctx.prec
     try:
         ctx.prec = BITS

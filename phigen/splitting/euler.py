@@ -1,9 +1,10 @@
 """The flow of a free rigid body by elliptic functions: ẋ_i = α_i x_j x_k for cyclic indices i, j, k, where some α_i are
 positive and some negative.
 
-The differences of the E_i = α_j α_k x_i² are constant. Let E_max and E_min be the largest and the smallest of them, P =
-E_max − E_min, and R the third E_i minus E_min. `phigen.symbolic.elliptic` defines κ as a function of t, P and R, and S
-and C as functions of κ and P. Then the addition theorem of Jacobi's functions gives the state x' after the time t:
+Let E_i = α_j α_k x_i²; the differences of the E_i are constant. Let E_max be the largest E_i and E_min the smallest,
+P = E_max − E_min, and R the third E_i minus E_min. `phigen.symbolic.elliptic` defines κ as a function of t, P and R,
+and S and C as functions of κ and P. Then the addition theorem of Jacobi's functions gives the state x' after the time
+t:
 
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − E_max S² = C² − E_min S²,
 
@@ -71,7 +72,7 @@ class EulerMotion:
         return self._placed(names, self.addition(symbol(TIME)).changes())
 
     def addition(self, time: Expression) -> Addition:
-        """Return the quantities of the addition theorem for a flow over the duration ``time``."""
+        """Return the `Addition` for a flow over the duration ``time``, from a state of symbols."""
         return Addition.at([symbol(name) for name in self.coordinates], self.factors, time)
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
@@ -102,7 +103,7 @@ class Addition:
 
     @classmethod
     def at(cls, x: Vector, factors: Vector, time: Expression) -> Addition:
-        """Return the quantities for a flow from the state ``x`` over the duration ``time``."""
+        """Return the `Addition` for the flow from ``x`` over the duration ``time``; ``factors`` are the α_i."""
         levels = levels_of(x, factors)
         conditions = _order(levels)
         low, middle, high = sorted_by(conditions, levels)
@@ -171,9 +172,9 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
 
 
 def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return the ``values`` of the three axes i in the order of increasing E_i.
+    """Return three ``values``, one for each E_i, in the order of increasing E_i.
 
-    ``conditions`` are the results of `_order`.
+    ``conditions`` are the three results of `_order`. Their signs determine this order.
     """
     second, third, last = conditions
     lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
@@ -184,9 +185,10 @@ def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Express
 def _ends(
     x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression, gaps: Vector
 ) -> list[Expression]:
-    """Return the increments of the x_i from the quantities σ_i, S and D (``divisor``) of the addition theorem.
+    """Return the increments of the x_i by the formula for x_i' at the head of the file.
 
-    ``gaps`` are the differences σ_j σ_k − D.
+    In this formula, ``factors`` are the α_i, ``sigma`` the σ_i, ``s`` is S and ``divisor`` is D. ``gaps`` are the
+    differences σ_j σ_k − D.
     """
     inverse = power(divisor, -1)
     return [
@@ -233,12 +235,12 @@ def identities() -> Iterator[tuple[str, Expression]]:
 def _function_identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the functions S and C of κ in `phigen.symbolic.elliptic`.
 
-    All expressions vanish if three formulas hold: C² + PS² = 1; dS/dt = CD; and 1 − C = 8z/(1 + z)² with z = Pκ². The
-    second formula is derived from dκ/dt = (1 + z)D/4, where D is Jacobi's dn, not the D of this module.
+    All expressions vanish if three formulas hold: C² + PS² = 1; dS/dt = C dn; and 1 − C = 8z/(1 + z)² with z = Pκ².
+    Here dn is Jacobi's function. The second formula is derived from dκ/dt = (1 + z) dn/4.
     """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
     s, c, _ = functions_of(kappa, p, r)
     yield "C² + PS²", c**2 + p * s**2 - 1
-    yield "dS/dt = CD", derivatives([s], name)[0] * (1 + p * kappa**2) / 4 - c
+    yield "dS/dt = C dn", derivatives([s], name)[0] * (1 + p * kappa**2) / 4 - c
     yield "1 - C", 8 * (p * kappa**2) * power(1 + p * kappa**2, -2) - (1 - c)

@@ -36,7 +36,7 @@ Motion = KeplerMotion | RelativeMotions | EulerMotion
 #: most four rows.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
-#: Description of a linear motion by a matrix exponential that is computed before the steps, for reports.
+#: Text in reports for linear equations that are solved by a matrix exponential, computed before the steps.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 
@@ -147,7 +147,7 @@ def _flow_of(ring: Ring, terms: Sequence[Term], methods: int) -> Flow:
 
 
 def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion | EulerMotion) -> Flow:
-    """Return the flow of a term that is a Kepler motion or a free rigid body."""
+    """Return the flow of ``term``, which is the Hamiltonian of a Kepler motion or of a free rigid body."""
     return Flow(term.expression, tuple(motion.increments(ring.coordinates)), motion.manner, motion=motion)
 
 
@@ -201,10 +201,10 @@ class Solved:
 
 
 def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
-    """Return the increments along a vector field, which need not be Hamiltonian, or the reason why there are none.
+    """Return the increments along a vector field, or the reason why phigen finds no formulas for them.
 
-    Linear first integrals are substituted as constants if that leads to a solution. The arguments ``linear`` and
-    ``methods`` are explained at `joint_flow`.
+    The vector field need not be Hamiltonian. Linear first integrals are substituted as constants if that leads to a
+    solution. The arguments ``linear`` and ``methods`` are explained at `joint_flow`.
     """
     direct = _increments(ring, field, linear)
     if not isinstance(direct, str):

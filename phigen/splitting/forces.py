@@ -126,7 +126,8 @@ def _merged_flows(flows: Sequence[Flow]) -> Flow:
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
     """Yield the flows of the damping field λππb, where b is the part of ∇H in a block of π.
 
-    b is written as a sum of as few terms as possible, such that the damping field of each term has a flow.
+    b is divided into summands. The damping field of each summand must have a flow that phigen finds. Divisions into few
+    summands are tried first.
     """
     slopes = gradient(system.hamiltonian, system.coordinates)
     ring = ring_of(system, slopes)

@@ -42,7 +42,7 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
     """Sum terms whose vector fields have monomials that cancel each other, and return the resulting list of
     terms.
 
-    Returns None if no monomials cancel, or if no sum has a flow.
+    Returns None if no monomials cancel, or if phigen finds no flow for any of the sums.
     """
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}

@@ -75,7 +75,7 @@ class KeplerMotion:
     def field(self, coordinates: Sequence[str]) -> list[Expression]:
         """Return the rates of all ``coordinates``; those that are not part of the motion have the rate 0.
 
-        The position and the momentum of the motion must be coordinates.
+        The components of ``position`` and ``momentum`` must be symbols of coordinates, not linear forms.
         """
         return self._placed(coordinates, self.rates())
 

@@ -24,18 +24,19 @@ from phigen.symbolic.tower import Generator, Poly
 #: Dimensions of space in which Kepler motions are recognised.
 _DIMENSIONS = (2, 3)
 
-#: Let ε be the sum of the coefficients of the perturbations, divided by the sum of the coefficients of the motions. If
-#: ε is below this number, methods for near-integrable systems are used. In steps of size h, their errors ε² h^6 and ε³
-#: h^4 are then smaller than the errors of general methods of order 4.
+#: Let ε be the size of the perturbations, divided by the size of all other terms; `size_of` computes sizes. If ε is
+#: below this number, methods for near-integrable systems are used. In steps of size h, their errors ε² h^6 and ε³ h^4
+#: are then smaller than the errors of general methods of order 4.
 SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
-    """Return the terms of H with each Kepler motion as a single term, first in the list. Returns None if there are no
-    motions.
+    """Return the terms of H, in which the Hamiltonian of each Kepler motion is a single term. These terms are first in
+    the list. Returns None if no term of this kind is found.
 
-    If ``rigid``, free rigid bodies are single terms too. A motion contains only terms of one body. A term with
-    coordinates of two bodies is not expanded: (p_1 + p_2)² stays one term, which commutes with functions of q_1 − q_2.
+    If ``rigid``, the Hamiltonians of free rigid bodies are single terms too. Each of these Hamiltonians depends on one
+    body only. A term with coordinates of two bodies is not expanded: (p_1 + p_2)² stays one term, which commutes with
+    functions of q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:
@@ -98,8 +99,10 @@ def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
 
 
 def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
-    """Return the terms of H without the monomials that belong to motions. Terms that contain no monomial of a motion
-    are left as written.
+    """Return the terms of H after removal of the monomials that occur in ``motions``.
+
+    ``motions`` are the Hamiltonians of Kepler motions and rigid bodies. Terms of H without a removed monomial are left
+    as written.
     """
     untouched, remaining = [], []
     for term in terms:
@@ -116,12 +119,14 @@ def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> li
 
 
 def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
-    """Whether a term depends only on coordinates of the motion."""
+    """Whether a term depends only on coordinates that occur in the Hamiltonian ``motion``."""
     return {*ring.support(term.element)} <= {*ring.support(motion.element)}
 
 
 def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, Poly]]:
-    """Yield the Kepler motions in H, each with its Hamiltonian as an element of the ring."""
+    """Find the Kepler motions whose Hamiltonian is a sum of monomials of H. Yield each motion with its Hamiltonian, as
+    an element of the ring.
+    """
     size = len(ring.tower.gens)
     supports = [{*ring.support(t.element)} for t in terms]
     for generator in ring.tower.generators:

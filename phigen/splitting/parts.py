@@ -111,8 +111,9 @@ def _candidates(
 ) -> Iterator[list[Term]]:
     """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
-    The lists come in this order: terms as written; squares of sums as single terms; motions as single terms; sums by
-    blocks of π; terms after subtraction of companions (Casimirs and similar functions); and sums of groups of terms.
+    The lists come in this order: terms as written; summands of H as single terms, not expanded into monomials; the
+    Hamiltonians of Kepler motions and rigid bodies as single terms; one sum for all terms that couple the same blocks
+    of π; terms after subtraction of companions (Casimirs and similar functions); and sums of groups of terms.
     """
     yield terms
     ring = conflicts.ring
@@ -135,11 +136,11 @@ def _candidates(
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
-    """Return the terms of H. If a summand has a flow as a whole, the summand is one term, and is not expanded into
+    """Return the terms of H. A summand of H is one term if phigen finds its flow; other summands are expanded into
     monomials.
 
     An example on so(3) is (v·m)². Its flow rotates m about v, but its monomials do not commute with each other. Returns
-    None if no summand of this kind exists.
+    None if all summands are expanded.
     """
     whole_terms: list[Term] = []
     remaining: list[Expression] = []

@@ -24,7 +24,8 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates of a sub-bracket (see `_companions`) of which phigen computes Casimirs.
+#: Casimirs are computed only for sub-brackets with at most this number of coordinates. `_companions` defines
+#: sub-brackets.
 MOST_COORDINATES = 8
 
 

@@ -67,8 +67,8 @@ class AttractingBodies:
 
 @dataclass(frozen=True)
 class RelativeMotions:
-    """The flow of A for attracting bodies: Kepler motions of relative coordinates, and the motion of the centre of
-    mass.
+    """The flow of attracting bodies with the Hamiltonian A, which the head of the file defines. Bodies move on Kepler
+    orbits in relative coordinates, and the centre of mass moves in a straight line.
 
     ``hamiltonian`` is A in Cartesian coordinates. ``kepler`` has the Kepler motions; their positions Q_i and momenta
     P_i are linear forms. ``total_momentum`` and ``inverse_mass`` are those of the centre of mass. ``spread`` maps each
@@ -90,11 +90,11 @@ class RelativeMotions:
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the time derivatives of the coordinates ``names`` along the flow of A."""
+        """Return the time derivatives of the coordinates ``names`` along the flow of this object."""
         return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of the coordinates ``names`` in the flow of A over the time `TIME`."""
+        """Return the increments of the coordinates ``names`` in the flow of this object over the time `TIME`."""
         shift = [symbol(TIME) * e for e in self.drift]
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 
@@ -277,7 +277,8 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: Name of the relative coordinates in specs → function that returns the Kepler motions of A, and B = H − A.
+#: Name of relative coordinates in specs → function that divides H into A + B (see the head of the file). The function
+#: returns the flow of A, and the Hamiltonian B.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

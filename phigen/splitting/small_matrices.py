@@ -4,7 +4,7 @@ Hamilton.
 The formulas are used if no shorter closed form is known. The entries of A may depend on coordinates that are constant
 along the flow. If A⁴ = Σ_{j<4} a_j A^j, the increments are Σ F_k A^k w. The F_k are functions of t and the a_j, see
 `phigen.symbolic.remainders`. A matrix with three rows is extended by zeros. For two rows, let τ be the trace of A and B
-= A − τ/2. Then B² is a number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
+= A − τ/2. Then B² is a number −d, and exp(tA) = e^{τt/2}(cos(t√d) + B sin(t√d)/√d).
 """
 
 from __future__ import annotations

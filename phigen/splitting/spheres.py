@@ -107,7 +107,7 @@ class _Sphere:
         return [2 * (c * projection - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
-        """Yield candidates for the number g such that the given matrix A is M + g with a matrix M of rank 1."""
+        """Yield candidates for g in the formula A = M + g·1, where A is the matrix ``a`` and M has rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
             quotient, remainder = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)

@@ -33,8 +33,8 @@ from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
     """Yield the statements about a splitting; those about single flows are in the order of the parts.
 
-    H is the Hamiltonian from which the Casimirs of the gauge have been subtracted. ``noise`` has pairs of the name of a
-    noise source and its flow.
+    In the statements, H is the Hamiltonian minus the gauge. ``noise`` has pairs of the name of a noise source and its
+    flow.
     """
     flows = splitting.flows
     hamiltonians = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
@@ -111,7 +111,7 @@ def bracket(system: System, f: Expression, g: Expression) -> Expression:
 def angles_added(e: Expression) -> Expression:
     """Return an expression in which sin, cos, 1 − cos and exp of sums are expanded by the addition theorems.
 
-    Proofs need this, since the ring does not contain these relations.
+    Proofs need the expanded form, since the ring does not contain the addition theorems.
     """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
