@@ -83,7 +83,7 @@ class ModifiedHamiltonian:
 
 
 def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> ModifiedHamiltonian:
-    """Return the modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
+    """Return the modified Hamiltonian of a method: H plus `CORRECTIONS` corrections. Raises `NotOfferedError`."""
     system, order = compilation.system, compilation.order
     if compilation.is_composed:
         raise NotOfferedError("a step is composed of several maps")

@@ -85,7 +85,7 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """Return a solver for the noise source ``name``: its Hamiltonian replaces H, and there is no noise.
+    """Return a solver without noise, which has the Hamiltonian of the noise source ``name`` instead of H.
 
     The vector field of the solver is σπ∇g, where σ is the amplitude and g the Hamiltonian of the source.
     """

@@ -196,7 +196,7 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
 def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
     """Yield the checks of energy, Casimirs and invariants along a run.
 
-    ``coarser`` is the rounding unit of the solver in units of double precision: 1, or more for single precision.
+    ``coarser`` is the rounding unit of the solver, divided by the rounding unit of double precision.
     """
     errors = errors_of(cell, trajectory)
     least = coarser * rounding(trajectory.steps)
@@ -414,7 +414,9 @@ class _SmallLattice:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Keyword arguments for steps: time, seed of the noise, parameters with bonds, and a fixed energy level."""
+        """Keyword arguments for steps: the time, the seed of the noise, the parameters, and a fixed energy level if
+        there is a monitor.
+        """
         held_level = _level_argument(self.subject.solver, self.x, self.parameters)
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held_level}
 

@@ -98,12 +98,14 @@ class FrameGrowth:
         return frame
 
     def see(self, tangent: Floats) -> None:
-        """Propagate the frame through one step, whose tangent map is the matrix ``tangent``."""
+        """Propagate the tangent vectors through one step. The matrix ``tangent`` is the tangent map of the step."""
         self.take(tangent @ self.frame)
 
     def take(self, propagated: Floats, steps: int = 1) -> None:
-        """Receive the frame after ``steps`` further steps: add up the growth of its columns, and orthonormalise
-        them.
+        """Receive the tangent vectors after ``steps`` further steps. Record their growth, and make them
+        orthonormal.
+
+        ``propagated`` has the tangent vectors as columns.
         """
         state = self.state
         state["frame"], r = np.linalg.qr(propagated)

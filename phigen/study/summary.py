@@ -44,8 +44,8 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method in a run with ``rows`` rows. Only the first ``good`` rows are evaluated: they are
-    finite.
+    """Errors of one method in a run with ``rows`` rows. ``good`` is the number of rows before the first row that is not
+    finite; later rows are ignored.
 
     ``exact`` is the largest error against the closed form, None if the run states no closed form. If the method fails
     in its first step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H −

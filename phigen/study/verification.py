@@ -238,7 +238,11 @@ def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Chec
 
 
 def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield two checks of systems with noise: of the strong order, and of steps with the largest increments."""
+    """Yield two checks for systems with noise.
+
+    The first check tests the strong order. The second counts the steps that fail if the increments of the noise are as
+    large as possible.
+    """
     system = subject.compilation.system
     if not system.noise:
         return
@@ -331,7 +335,8 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
     system, steps = subject.compilation.system, subject.steps
     compared = subject.others
     times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
-    # With forces the work is integrated over the physical time t, which classical methods in τ do not compute.
+    # With forces, the work is an integral over the physical time t. Classical methods in τ do not compute t, so they
+    # are not compared.
     if system.forces and subject.compilation.monitor:
         trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
         times, compared = trajectory.t, {}
