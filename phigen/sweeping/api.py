@@ -208,8 +208,8 @@ def _sweep_of(
 
 
 def _plain_entries(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """Return those entries of ``over`` that are settings: ``random``, ``seed`` and ``file``. Other entries are ranges
-    of quantities.
+    """Return the settings in the map ``over``: its entries ``random``, ``seed`` and ``file``. All other entries are
+    ranges of quantities.
 
     If the spec has a parameter with one of these names, the entry is the range of the parameter, and is left out here.
     """

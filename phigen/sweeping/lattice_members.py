@@ -161,7 +161,10 @@ class _Member:
         return self.session.hamiltonian(), [np.asarray(reduced(kind, densities)) for kind, densities in pairs]
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
-        """Return the change of the energy, and the largest change of a Casimir, since the values ``before``."""
+        """Return the change of the energy, and the largest change of a Casimir.
+
+        ``before`` has the earlier values: the energy, and the Casimirs.
+        """
         energy, casimirs = self._conserved_values()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}

@@ -156,7 +156,9 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> No
 
 
 def _with_ensembles(spec: Spec) -> Spec:
-    """Return the spec with the code for ensembles, even if ``without:`` leaves it out: sweeps need this code."""
+    """Return a spec for which the code for ensembles is generated, even if the key ``without:`` leaves this code out.
+    Sweeps need the code.
+    """
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
@@ -200,9 +202,10 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, Any]:
-    """Return the path of the spec, and the digests of the data files that a run of a lattice reads.
+    """Return the data files that a run of a lattice reads, as data for JSON: the path of the spec, and the digest of
+    each file.
 
-    The result is {} if the run reads no files.
+    If the run reads no data files, the result is {}.
     """
     if run.lattice is None:
         return {}
@@ -218,7 +221,7 @@ def _files(spec: Spec, run: Run) -> dict[str, Any]:
 
 
 def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
-    """Return the data of the solver that workers need, as `store.solver_data` returns them."""
+    """Return the data from which workers load the solver. `store.solver_data` describes these data."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
     return store.solver_data(interface_of(program), files_of(program, target, command), functions, spec.source)
