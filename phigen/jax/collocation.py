@@ -232,9 +232,9 @@ def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float)
 
 
 def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of A L = side; ``linear`` is the linear map A.
+    """Return the solution L of A L = side, found by `_swept_linear`; ``linear`` is the linear map A.
 
-    JAX can transpose this function: the transposed equation is solved by the same iteration.
+    JAX can transpose this function. Then `_swept_linear` solves the transposed equation.
     """
     return jax.lax.custom_linear_solve(
         linear, side, lambda f, b: _swept_linear(f, b, unit), lambda f, b: _swept_linear(f, b, unit)

@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint in the error message for a bracket: no Gauss step is known that is a Poisson map for the bracket.
+#: Hint for a bracket for which no exact Poisson map is known.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 
