@@ -1,1 +1,1 @@
-"""Lowering to SIMD lanes: the parts of a program that are evaluated at several points together."""
+"""Choice of the kernels that a program evaluates at several points together, in SIMD lanes."""

@@ -198,10 +198,10 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps, if several steps can be solved together. Otherwise return the paths for the
-    reverse pass.
+    """Return `Blocks` if several steps can be solved together. Otherwise return `Traces`, for the paths of the reverse
+    pass.
 
-    In single precision, or if the spec excludes lanes, None is returned instead of the paths.
+    The result is None if neither is possible. `Traces` require numbers of 64 bits.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):

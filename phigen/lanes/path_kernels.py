@@ -40,7 +40,9 @@ def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> t
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels for blocks of steps along Karasev's paths, which are solved together in SIMD lanes."""
+    """Return the kernels of blocks. In a block, several steps along Karasev's paths are solved together, one in each
+    SIMD lane.
+    """
     momentum = Kernel("momentum", "the momenta p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
@@ -52,8 +54,10 @@ def back(path: PathAdjoint) -> list[Kernel]:
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels with which a Taylor expansion begins. The kernels compute p = ∇S_h with its derivative, and
-    the coefficients of order 0 of all series.
+    """Return the kernels that start the Taylor series of a path and of its derivatives.
+
+    One kernel computes p = ∇S_h and the Hessian of S_h. The other kernels compute the coefficients of order 0 of all
+    series.
     """
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
