@@ -74,8 +74,8 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
     span it.
 
     Each basis element that has nonzero brackets is in one of the ideals. All other basis elements are left out, since
-    M_p x has no component along them. Ideals may share central elements, such as the element that a central
-    extension adds.
+    π(x)p has no component along them. Ideals may share central elements, such as the element that a central extension
+    adds.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
@@ -97,7 +97,8 @@ def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None
-    # Let e_a be the projections onto the summands. Then M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
+    # Let M_p be the matrix with M_p x = π(x)p, and e_a the projections onto the direct summands of the ideal. Then M_p
+    # = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
     summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
     closed_summands = [s for s in summands if s is not None]
     if len(closed_summands) < len(summands):

@@ -137,8 +137,9 @@ def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
 class _Trivialised:
     """Solver of the linear equations for R⁻¹ and L⁻¹.
 
-    R and L are the right and left trivialised derivatives of the map τ. The equations are solved by elimination, with
-    rational functions of p and of the functions of p that occur in τ.
+    R and L are the right and left trivialised derivatives of τ, the map from the Lie algebra to its group that the spec
+    states. The equations are solved by elimination, with rational functions of p and of the functions of p that occur
+    in τ.
     """
 
     def __init__(self, system: System, representation: Representation, tau: Matrix) -> None:
@@ -168,8 +169,8 @@ class _Trivialised:
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
         """Return the rows of the equations with the first n columns reduced to the identity.
 
-        Raises `SpecError` if the derivative of the map τ is singular. Also raises `SpecError` if the equations have no
-        solution; the derivative is then not in the algebra.
+        The equations are those at the head of the module, for the map τ of the spec. Raises `SpecError` if dτ is
+        singular, and if the equations have no solution. Without a solution, (∂τ/∂p_j) τ⁻¹ is not in the Lie algebra.
         """
         reduced: list[list[Scalar]] = []
         for k in range(n):

@@ -6,8 +6,8 @@ path. The path is a trajectory of the linear Hamiltonian p·x, so it stays on it
 path is exact to round-off, the step is a Poisson map to round-off.
 
 The S_i are computed from formal series. The mean of the path that starts at x is Σ D^j x/(j+1)! with D = Σ (πp)_a ∂_a.
-α is the inverse of the map from x to this mean. S_1 … S_k require α up to degree k − 1 in p. For linear π this is the
-exponential bi-realisation.
+α is the inverse of the map from x to this mean. S_1 … S_k require α up to degree k − 1 in p. If π is linear, α and β
+are the maps of the exponential bi-realisation.
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ KIND = "pullback"
 
 
 def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> BiRealisation:
-    """Return the bi-realisation of a π that the spec states in other coordinates y, as maps in the coordinates x of the
-    spec.
+    """Return the bi-realisation in the coordinates x of the spec, for a π that the spec states in other
+    coordinates y.
 
     ``build_inner`` makes the bi-realisation in the coordinates y. Raises `SpecError` if the spec does not state π as a
     pull-back, and if the bi-realisation in the coordinates y is truncated or follows paths.

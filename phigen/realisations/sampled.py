@@ -111,7 +111,10 @@ def _failures(
 
 
 def _halves(rows: list[list[Fraction]]) -> tuple[Any, Any]:
-    """Return two matrices: the derivatives with respect to x, and those with respect to p."""
+    """Return the matrices ∂f/∂x and ∂f/∂p, where f is α or β.
+
+    Each row of ``rows`` belongs to one component of f: its derivatives with respect to x, then those with respect to p.
+    """
     n = len(rows)
     return _matrix([row[:n] for row in rows]), _matrix([row[n:] for row in rows])
 

@@ -23,7 +23,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly
 
-#: Largest number of terms of a polynomial in a series.
+#: Largest number of monomials in one term of a Lie series.
 MOST_TERMS = 20_000
 
 
