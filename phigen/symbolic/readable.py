@@ -26,7 +26,7 @@ from phigen.symbolic.tower import Poly, Tower, rational
 #: Largest number of terms of a displayed formula, by default. An ellipsis stands for further terms.
 SHOWN = 8
 
-#: Names of φ and its derivatives in displayed formulas.
+#: Names of φ, φ' and φ'' in displayed formulas; `phigen.symbolic.special` defines φ.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
 #: Definitions of internal functions that occur in formulas of flows. A definition is displayed below the formulas that

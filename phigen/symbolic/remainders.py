@@ -25,12 +25,12 @@ from typing import Any
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 
-#: Halving of t ends when a bound for the roots of p is at most MAX_ROOT. Then TERMS terms of the series of e^y are
-#: summed; the omitted terms are below 10⁻¹⁷.
+#: The head of the module explains t, p and y. The number t is halved until a bound for the roots of p is at most
+#: MAX_ROOT. Then TERMS terms of the series of e^y are summed; the omitted terms are below 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
-#: Number of halvings of t, and of squarings, in SIMD code, which has no branches. Two halvings suffice for roots up to
-#: 4 `MAX_ROOT`.
+#: Number of halvings of the argument t in SIMD code. The number is constant, since SIMD code has no branches. Two
+#: halvings suffice for roots up to 4 `MAX_ROOT`.
 LANE_DOUBLINGS = 2
 
 

@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: Names, in expressions, of φ, φ' and φ''. Higher derivatives are not available.
+#: Names of φ, φ' and φ'' in expressions; the head of the module defines φ. Higher derivatives are not available.
 SPECIAL = ("phi0", "phi1", "phi2")
 
 #: Bounds of |s| between three ways to compute φ. For |s| < NEAR it is the sum of a power series. For NEAR ≤ |s| <
@@ -40,7 +40,9 @@ def _series(n: int) -> Fraction:
 
 
 def order_of(name: str) -> int:
-    """Return the order, 0, 1 or 2, of the derivative of φ with this name in expressions."""
+    """Return the number of primes of φ, φ′ or φ″. ``name`` is the name of the function in expressions; `coefficient`
+    defines φ.
+    """
     return SPECIAL.index(name)
 
 
@@ -53,7 +55,11 @@ def coefficient(order: int, n: int) -> Fraction:
 
 
 def near_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of φ, φ′ or φ″ that are needed for |s| < `NEAR`, the constant one first."""
+    """Return the Taylor coefficients that are needed for φ, φ′ or φ″ if |s| < `NEAR`, the constant coefficient
+    first.
+
+    ``order`` is the number of primes; `coefficient` defines φ.
+    """
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
 
 

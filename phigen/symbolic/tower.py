@@ -260,7 +260,7 @@ class Tower(Arithmetic[Poly]):
     def _entire(self, name: str, s: Poly) -> Poly:
         """Return the value at s of a function of `ENTIRE`, expressed by cosroot, sinroot, exp and 1/s.
 
-        The generators cosroot(s) and sinroot(s) are always added together.
+        If cosroot(s) or sinroot(s) is needed, the ring receives both as generators.
         """
         if s.is_constant() and s == 0:
             return self.constant(ENTIRE[name].coefficient(0))
@@ -474,7 +474,9 @@ class Tower(Arithmetic[Poly]):
 
     def numerator(self, element: Poly) -> Poly:
         """Return the product of the element and a function without zeros, chosen such that the product contains no
-        reciprocals. The relations of generators are used.
+        reciprocals.
+
+        The product is simplified by relations between generators, such as sin² + cos² = 1.
         """
         degrees = element.degrees()
         for g in reversed(self.generators):

@@ -17,7 +17,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Name of the universal anomaly in expressions. Its arguments are t, r, η, β, μ and |q × q̇|².
+#: Name of the universal anomaly in expressions: a function of t, r, η, β, μ and |q × q̇|². The head of the module
+#: defines the arguments.
 ANOMALY = "anomaly"
 
 #: Largest number of iterations for the equation of s; if they do not suffice, s has no value. Bisection alone takes 53
