@@ -75,9 +75,9 @@ def facts(
 ) -> dict[str, object]:
     """Return the constants that describe a system in a module, as template values.
 
-    ``listed`` prints a sequence, and ``key`` the name of a parameter. The default of a lattice parameter may be an
-    array, which belongs to one size of the lattice. The module serves all sizes, so it contains ``nothing`` in place of
-    the array.
+    ``listed`` prints a sequence, and ``key`` the name of a parameter. ``nothing`` is the null value of the language,
+    such as ``None``. If the default of a lattice parameter is an array, ``nothing`` replaces the array: an array
+    belongs to one size of the lattice, and the module serves all sizes.
     """
     noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {

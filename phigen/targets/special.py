@@ -76,19 +76,20 @@ def values(function: str, name: str) -> Mapping[str, object]:
 
 
 def closed(order: int) -> tuple[str, ...]:
-    """Return statements that compute a derivative of φ in closed form, after statements for φ and for the lower
-    derivatives.
+    """Return statements that compute φ, and its derivatives up to ``order``, in closed form.
 
-    The statements are valid in C and in Python, and use c = w cot w.
+    The statements are valid in C and in Python. They read the variable c = w cot w; the head of the module defines φ
+    and w.
     """
     return _CLOSED[: order + 1]
 
 
 def turns(*, single: bool) -> dict[str, object]:
-    """Return constants for subtracting multiples of π from w = √s/2: 1/π, and an upper and a lower part of π.
+    """Return constants for subtracting multiples of π from w = √s/2: 1/π, an upper and a lower part of π, and a limit
+    of s.
 
     The sum of the two parts is π. The upper part has 33 bits, so its products with integers up to 2^20 are exact. In
-    single precision, the upper part has 8 bits, and the integers go up to 2^16. For s up to ``limit``, no larger
+    single precision, the upper part has 8 bits, and the integers go up to 2^16. For s up to the limit, no larger
     integer is needed.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)

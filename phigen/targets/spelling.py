@@ -1,4 +1,4 @@
-"""Values of the loop IR as text: the common part of the printers of statements in all languages."""
+"""Values of the loop IR as text. The printers of statements in all languages use this module."""
 
 from __future__ import annotations
 

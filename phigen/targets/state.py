@@ -41,7 +41,9 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """Yield the statements that copy the local variables back to the members in the list ``saved``."""
+        """Yield the statements that copy the local variables back to the struct. The field ``saved`` lists the members
+        that are copied.
+        """
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 

@@ -81,7 +81,9 @@ def unrestricted(program: Program, code: str) -> str:
 
 
 def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
-    """Return the assembler of a solver, and the names of the runtime files with which header and source begin."""
+    """Return the assembler of the C of a solver, and the names of two files of the runtime. The header of the solver
+    begins with the first file, and the source with the second.
+    """
     lanes = in_lanes(program)
     has = switches(program, lanes)
     constants, real = policies(program, staged=has["STAGED"]), real_of(program)

@@ -34,7 +34,7 @@ def _calls(lanes: Lanes | None, function: str) -> Callable[[Program], bool]:
 
 
 def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
-    """Yield the features that depend on the parts of the program in SIMD lanes."""
+    """Yield the features that depend on the use of SIMD lanes."""
     blocks = lanes if isinstance(lanes, Blocks) else None
     traces = lanes if isinstance(lanes, Traces) else None
     packs = lanes if isinstance(lanes, Packs) else None

@@ -226,7 +226,8 @@ CONDITIONS = {
     "tangent_product.c": "TANGENT",
 }
 
-#: Hooks: functions whose calls are whole statements. Each has the condition under which its calls remain.
+#: Hooks: functions whose calls are whole statements. The values are conditions: if the condition does not hold for the
+#: features of a solver, the calls are removed from its C.
 CALLS = {
     "phi_add_aside": "RATE_OF_GAUGE",
     "phi_add_by_parameters": "PARAMETERS || MONITOR",

@@ -45,16 +45,17 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: Number of derivatives from which the increment of a stage is predicted: the derivatives at the end and the start of
-#: the present step, and at the starts of earlier steps.
+#: Number of values of ẋ from which the increment of a stage is predicted: at the end and the start of the present step,
+#: and at the starts of earlier steps.
 KNOTS = 4
 
 
 def travels(fractions: Sequence[float]) -> list[list[float]]:
-    """Return, for each stage, the weights w with which Σ w_k f_k predicts the increment of the stage.
+    """Return, for each stage, the weights w with which h Σ w_k f_k predicts the increment of the stage.
 
-    f_k are the derivatives at the times 2 − `KNOTS` … 1, in units of the step. The sum is the integral over the stage
-    of the polynomial through the f_k. Gauss' rule of three points computes this integral exactly.
+    The f_k are the values of ẋ at the times 2 − `KNOTS` … 1, in units of the step size h. The sum is an integral over
+    the time of the stage. The integrand is the polynomial through the f_k. Gauss' rule of three points computes this
+    integral exactly.
     """
     knots = range(2 - KNOTS, 2)
     weights = []
@@ -66,7 +67,9 @@ def travels(fractions: Sequence[float]) -> list[list[float]]:
 
 
 def grouped(program: Program, lanes: Lanes | None) -> bool:
-    """Whether ensembles are integrated in SIMD batches. This requires that the history of a batch fits on the stack."""
+    """Whether members are integrated in groups (see `Blocks`). A group must fit on the stack, together with the earlier
+    values that its predictors store.
+    """
     memory = remembered(program, lanes)
     values = len(program.fractions) * (memory["REMEMBERED"] + memory["WINDOW"]) * program.dimension
     return isinstance(lanes, Blocks) and lanes.grouped(values)
@@ -91,7 +94,7 @@ def printed(
 
 
 def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
-    """Return the text of the transposed flows for batches of members with explicit steps."""
+    """Return the C functions of the transposed flows of a splitting, for SIMD batches of members."""
     return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 

@@ -2,7 +2,7 @@
 
 A phrase is a macro. The runtime contains its name, such as ``PHI_AND_STAGE``. Its text depends on switches of the
 solver, and replaces the name in generated code (`phigen.targets.c.macros`). `header` prints all definitions with
-``#if`` conditions, so that a compiler can read the runtime before assembly.
+``#if`` conditions, so that a compiler can also read the runtime itself, in which the names are not replaced.
 """
 
 from __future__ import annotations
@@ -779,7 +779,7 @@ def names() -> frozenset[str]:
 
 
 def header() -> str:
-    """Return all phrases as a C header with conditions."""
+    """Return a C header that defines all phrases. Lines with ``#if`` select the texts by the features of the solver."""
     return "\n".join(line for choice in ALL for line in choice.header())
 
 

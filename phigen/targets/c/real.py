@@ -94,8 +94,8 @@ class Real:
         return literal(value) if self.words else repr(value)
 
     def threshold(self, value: float) -> float:
-        """Return the value of a named constant in this type. Small constants are thresholds, which depend on the
-        precision.
+        """Return the value of a named constant for this type; ``value`` is the value for double. Small constants are
+        thresholds, which depend on the precision. Larger constants keep their values.
         """
         return threshold(value) if self.words and 0.0 < value < THRESHOLD else value
 

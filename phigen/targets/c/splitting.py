@@ -41,7 +41,7 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
 
 
 def printed(program: Program, step: Splitting) -> str:
-    """Return the text of the functions of the flows, and of the function of a step."""
+    """Return the C functions of the flows, and the C function of a step."""
     build, schedule = _functions(program, step), step.schedule
     texts = [function(program, replace(step.prepare, name="prepare_row"))]
     texts += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
@@ -90,14 +90,14 @@ def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
 
 
 def tangent(program: Program, step: Splitting) -> str:
-    """Return the text of the derivatives of the flows."""
+    """Return the C functions that compute the derivatives of the flows: the Jacobian matrices of their increments."""
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in step.tangents]
     applied = commented(_functions(program, step).tangent(len(step.flows)), program)
     return "\n".join([*texts, _tables(program, step, "", "_of"), applied])
 
 
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
-    """Return the text of the transposes of the flows."""
+    """Return the C functions that pull a cotangent back through the flows."""
     kernels, build = _transposed(program, step, adjoint.steps)
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in kernels]
     return "\n".join([*texts, _tables(program, step, "flow_", ""), commented(build.back(), program)])
@@ -126,7 +126,7 @@ def adjoint_in_lanes(
 
 
 def reaches_full_range(kernel: Kernel) -> bool:
-    """Whether a kernel in lanes needs a second version, for all arguments of elementary functions."""
+    """Whether a kernel in lanes needs a second version, in which elementary functions accept all arguments."""
     return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
 

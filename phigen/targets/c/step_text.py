@@ -126,7 +126,9 @@ def _path_in_lanes(program: Program, step: Path, slopes: PathSlopes) -> str:
 
 
 def path_sizes(slopes: PathSlopes, slope_terms: int) -> Sizes:
-    """Return the sizes for paths in SIMD lanes, as constants."""
+    """Return constants of the C for derivatives of paths in SIMD lanes: numbers of Taylor terms, of series and of
+    values that are constant along a path.
+    """
     return [
         ("SLOPE_TERMS", slope_terms, "largest number of Taylor terms of derivatives of a path"),
         ("SLOPE_SERIES", max(1, len(slopes.series)), "further Taylor series that derivatives of a path need"),
@@ -153,7 +155,8 @@ def _splitting_texts(program: Program, step: Splitting, lanes: Lanes | None, has
     return texts
 
 
-#: The text of each kind of step. The text of a lattice is in `phigen.targets.c.lattice`.
+#: The parts of the C that depend on the kind of step, for each kind. `phigen.targets.c.lattice` prints the C of
+#: lattices.
 STEP_TEXTS: Mapping[str, StepText] = {
     "newton": StepText(constants=lambda program, step: _max_iterations(step), kernels=_newton_kernels),
     "explicit": StepText(
@@ -176,5 +179,5 @@ STEP_TEXTS: Mapping[str, StepText] = {
 
 
 def text_of(program: Program) -> StepText:
-    """Return the record for the kind of step of a program. Raises `KeyError` for a lattice, which has no record."""
+    """Return the entry of `STEP_TEXTS` for the step of a program. Raises `KeyError` for a lattice."""
     return STEP_TEXTS[program.step.kind.name]

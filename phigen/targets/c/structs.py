@@ -105,7 +105,8 @@ COTANGENT = (
     ),
 )
 
-#: Members of the struct for linearised stages in SIMD lanes, which the reverse pass needs.
+#: Members of the C struct ``phi_traced``. The reverse pass stores linearised stages in this struct, one in each SIMD
+#: lane.
 TRACED = (
     StateBlock(
         "stages",

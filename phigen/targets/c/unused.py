@@ -57,7 +57,9 @@ def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
 
 
 def _names_used(text: str) -> set[str]:
-    """Return the names that a text uses, without names of members. In preprocessor directives, all names count."""
+    """Return the names that C code uses, without the names of struct members. In preprocessor directives, all names
+    count.
+    """
     return used_names(text).union(*map(names, _directives(text)))
 
 

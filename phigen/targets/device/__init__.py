@@ -1,1 +1,1 @@
-"""The target device: a single header that is valid OpenCL C, CUDA and HIP."""
+"""The target ``device``: generated code in one header that is valid OpenCL C, CUDA and HIP."""

@@ -29,7 +29,9 @@ SUFFIX = "_device.h"
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the generated file by its name. Its header says that ``command`` regenerates it."""
+    """Return a dictionary from the name of the generated file to its text. The comment at the head of the file says
+    that ``command`` regenerates it.
+    """
     name = program.name
     lines = [*header_lines(program, command), *_READING]
     if slow := spilling(program):
@@ -55,7 +57,7 @@ def for_devices(program: Program) -> Program:
 
 
 def text_of_device(program: Program) -> str:
-    """Return the text of the file without its header comment.
+    """Return the text of the generated header for devices, without the comment at its head.
 
     Raises `SpecError` for bodies in relative coordinates.
     """

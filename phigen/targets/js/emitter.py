@@ -103,7 +103,7 @@ def _system(program: Program) -> Mapping[str, object]:
 
 
 def _sizes(attitude: Attitude) -> Mapping[str, int]:
-    """Return the sizes of the arrays of an attitude, as template values."""
+    """Return the sizes of arrays in the JavaScript for attitudes, as template values."""
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     covector = len(group.matrices) + 1 if attitude.exponential else 0
     return {

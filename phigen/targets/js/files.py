@@ -150,7 +150,8 @@ MEMBERS = {
     "lattice_observed_fields": "OBSERVED_FIELDS",
 }
 
-#: Hooks: functions whose calls are whole statements. Each has the condition under which its calls remain.
+#: Hooks: functions whose calls are whole statements. The values are conditions: if the condition does not hold for the
+#: features of a solver, the calls are removed from its module.
 HOOKS = {
     "addPosition": "POSITION",
     "addPositions": "POSITION",

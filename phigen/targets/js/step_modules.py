@@ -118,7 +118,8 @@ def _splitting_kernels(program: Program, step: Splitting) -> Sequence[Kernel | N
     return [replace(step.prepare, name="prepare_row"), step.refresh, *flows, *step.tangents]
 
 
-#: The text of each kind of step. The text of a lattice is in `phigen.targets.js.lattice_tables`.
+#: The parts of a module that depend on the kind of step, for each kind. `phigen.targets.js.lattice_tables` prints the
+#: modules of lattices.
 STEP_MODULES: Mapping[str, StepModule] = {
     "newton": StepModule(
         kernels=lambda program, step: [step.prepare, step.refresh, step.main],

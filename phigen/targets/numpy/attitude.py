@@ -41,7 +41,7 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
 
 
 def _turn_of_stage(attitude: Attitude, solved: str, *, collocates: bool) -> str:
-    """Return the expression for the attitude increment of a stage minus the identity.
+    """Return the Python expression for ΔF − 1. The group element ΔF is the attitude increment of a stage.
 
     ``solved`` is the expression for the solution of the stage. ``collocates`` says that the step is a Gauss step.
     """

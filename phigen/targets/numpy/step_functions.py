@@ -136,7 +136,8 @@ def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, obj
     """Return template values: the recurrences for a path and for its derivatives. The derivatives are computed column
     by column.
 
-    The path is differentiated with respect to its start, the covector p, and the coefficients that π depends on.
+    The path is differentiated with respect to three arguments: the start of the path, the covector p, and the
+    coefficients that π depends on.
     """
     path, slopes, n = step.recurrences, adjoint.slopes, program.dimension
     whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
@@ -203,7 +204,8 @@ def _splitting_values(step: Splitting) -> dict[str, object]:
     }
 
 
-#: The text of each kind of step. The text of a lattice is in `phigen.targets.numpy.lattice_module`.
+#: The parts of a module that depend on the kind of step, for each kind. `phigen.targets.numpy.lattice_module` prints
+#: the modules of lattices.
 STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
     "newton": StepFunctions(
         stage=_newton,
@@ -231,5 +233,5 @@ STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
 
 
 def functions_of(program: Program) -> StepFunctions:
-    """Return the record for the kind of step of a program. Raises `KeyError` for a lattice, which has no record."""
+    """Return the entry of `STEP_FUNCTIONS` for the step of a program. Raises `KeyError` for a lattice."""
     return STEP_FUNCTIONS[program.step.kind.name]

@@ -68,7 +68,7 @@ def _of_gauge(program: Program) -> str:
 
 
 def _of_time(program: Program) -> dict[str, object]:
-    """Return the arguments and sentences on the time for templates; they are empty if H does not depend on the time."""
+    """Return the template values that concern the time: arguments of functions, and text for docstrings."""
     time = bool(program.time)
     return {
         "time": time,
@@ -105,8 +105,8 @@ def _of_step(program: Program) -> dict[str, object]:
 
 
 def _of_noise(program: Program) -> dict[str, object]:
-    """Return the arguments and sentences on noise for templates, and the expressions for coefficients that depend on
-    time or noise.
+    """Return the template values that concern noise: arguments of functions, and text for docstrings. Other values are
+    expressions for coefficients that depend on time or noise.
     """
     noise = program.noise
     renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []

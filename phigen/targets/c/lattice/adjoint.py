@@ -186,8 +186,8 @@ class _Reverse(RowLoops):
             )
 
     def _driver(self, title: str, name: str, cases: Mapping[int, RowSegment]) -> str:
-        """Return the text of a row driver that runs one traversal; ``cases`` has the statements for each part, by its
-        number.
+        """Return the C function that runs one traversal of the sites for a part of H or for a kernel. ``cases`` has the
+        statements, by the number of the part or kernel.
         """
         step, back = self.layout.step, name == "back_rows"
         full_range = ["coef", *["full_range"] * bool(self.rows.limited)]
@@ -202,7 +202,8 @@ class _Reverse(RowLoops):
     def of_parts(self) -> Iterator[Back]:
         """Yield, for each part of H, the calls of its transposed sweeps in the two traversals of the sites.
 
-        The second traversal is left out if the next flow of the reverse pass adds the contributions.
+        The head of the module explains the two traversals. The second is left out if it is merged with the first
+        traversal of the next flow.
         """
         program, layout, step = self.program, self.layout, self.layout.step
         recomputed, back = can_recompute_fields(program, step), transposes(program, step)

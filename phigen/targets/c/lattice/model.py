@@ -119,7 +119,7 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
-    """Return the members of the struct that holds derivatives with respect to parameters."""
+    """Return the declarations of a C struct with the cotangents of the parameters."""
     declared = [f"double {'*' * (p.at != 'all')}{member[p.name]};" for p in program.parameters]
     return declared or ["char unused;"]
 

@@ -112,7 +112,7 @@ Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 
 def _purpose(loop: ir.Function, name: str) -> str:
-    """Return the comment on a loop that is printed with the given name.
+    """Return the comment on a loop. In the generated C, the loop has the name ``name``.
 
     The comment on a loop for arguments of any size refers to the loop for small arguments, which has the same name up
     to the suffix.
