@@ -4,10 +4,10 @@ A monitor is a positive function g of the state. Steps of equal size in the time
 t where g is small.
 
 Candidates are made from expressions in H that resemble distances: denominators, and arguments of roots and logarithms.
-Further candidates are made from the state and from the speed |π∇H|. If H splits into two parts, ``log`` is a candidate
-too. Runs without and with a monitor are compared over the same time, with the same order and energy error. The gain of
-a monitor is the number of steps without it, divided by the number of steps with it. The step size for the requested
-error is found by halving, and then by interpolation between two step sizes.
+Further candidates are made from the state and from the speed |π∇H|. Another candidate is ``monitor: log``, which
+requires that H splits into two parts. Runs without and with a monitor are compared over the same time, with the same
+order and energy error. The gain of a monitor is the number of steps without it, divided by the number of steps with it.
+The step size for the requested error is found by halving, and then by interpolation between two step sizes.
 """
 
 from __future__ import annotations
@@ -45,19 +45,21 @@ from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: MOST_BASES: largest number of expressions b in H, such as the square r² of a distance, from which candidates are
-#: made. QUARTERS: values of k, the most promising first, for the candidates (r²)^(k/4) and (1 + Σ 1/b)^(−k/4).
-#: OF_SPEED: values of k for the candidates (1 + v²/m)^(−k/4), where v is the speed |π∇H| and m the median of v².
+#: The three constants limit the candidate monitors. MOST_BASES: largest number of expressions b in H, such as the
+#: square r² of a distance, that candidates contain. QUARTERS: values of k, the most promising first, in the candidates
+#: (r²)^(k/4) and (1 + Σ 1/b)^(−k/4). OF_SPEED: values of k in the candidates (1 + v²/m)^(−k/4). Here v is the speed
+#: |π∇H|, and m is the median of v² along the motion.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
-#: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
-#: space.
+#: Largest number of characters of a monitor, so that users can read and modify it. A monitor with two distances in
+#: space is shorter.
 MOST_LETTERS = 160
 #: HIGHEST: largest order at which monitors are compared. SECONDS: largest duration of a run in seconds. A run with a
 #: monitor may have MOST · n steps, where n is the number of steps without a monitor, or FEWEST if that is larger.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25
-#: HALVINGS: largest number of halvings of a step. MOST: factor in the limit for the steps of a run with a monitor.
+#: HALVINGS: largest number of halvings of a step size. MOST: a run with a monitor may have MOST times as many steps as
+#: the run without a monitor.
 HALVINGS, MOST = 30, 64
 
 
@@ -193,7 +195,7 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
     """Return the settings to build, all of the same order.
 
-    The first setting has no monitor. The second is a splitting with the monitor ``log``. The others combine each of the
+    The first setting has no monitor. The second is a splitting with ``monitor: log``. The others combine each of the
     ``monitors`` with the series and with Gauss collocation.
     """
     order = min(order + order % 2, HIGHEST)

@@ -1,4 +1,6 @@
-"""Reference solutions for errors of orbits, by two methods whose difference is the uncertainty."""
+"""Reference solutions for errors of orbits. Two methods compute the same orbit; the difference of their results is the
+uncertainty.
+"""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: The search measures methods over the time span of a number of steps of the run. PIECE_SECONDS: processor time that
-#: the method of the spec takes for these steps, in seconds. PIECE_STEPS: largest number of these steps; the least
-#: number is 500.
+#: Each method is measured over a part of the run of the spec. The part is as long as n steps with the step size of the
+#: spec. PIECE_SECONDS: processor time, in seconds, of n steps with the method of the spec. PIECE_STEPS: largest n; the
+#: least n is 500.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.
@@ -75,9 +75,10 @@ def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
 
 
 def _growth(field: Callable[[Floats], Floats], x: Floats, width: float) -> float:
-    """Return an estimate of the largest |λ| at a state (DIM,), where λ are the eigenvalues of the derivative.
+    """Return an estimate of the largest |λ| at the state ``x`` (DIM,), where λ are the eigenvalues of the Jacobian
+    matrix of ``field``.
 
-    The derivative is applied repeatedly to a vector, by finite differences of size ``width``.
+    The Jacobian matrix is applied repeatedly to a vector, by finite differences of size ``width``.
     """
     v, log = np.random.default_rng(0).normal(size=len(x)), 0.0
     for k in range(FOLLOWED):

@@ -14,7 +14,8 @@ from phigen.tuning.trials import Point
 FINER, MOST_POINTS = math.sqrt(2.0), 48
 #: Number of times that a scan reduces its first step size if runs with it fail.
 FAILURES = 16
-#: A scan continues until the error is below this fraction of the accuracy, so that figures show the curve beyond it.
+#: A scan continues until the error is below this fraction of the accuracy. So figures also show errors below the
+#: accuracy.
 BEYOND = 1 / 30
 #: Step sizes are chosen so that the error is at most this fraction of the largest accepted error. This leaves a margin,
 #: since the error of a longer run is slightly larger.

@@ -27,8 +27,10 @@ ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 #: Word for ``kind`` of a setting that is a splitting, and so has no bi-realisation.
 SPLITTING = "splitting"
 
-#: Word for ``kind`` of a setting that is Gauss collocation; below, the orders that are tried.
+#: Value of the field ``kind`` in settings with Gauss collocation.
 GAUSS = "gauss"
+
+#: Orders that are tried for Gauss collocation.
 GAUSS_ORDERS = (4, 8, 12, 16)
 
 #: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
@@ -78,7 +80,7 @@ class Setting:
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """Orders that are available for settings which differ from this one in the order only."""
+        """Orders that this setting can have if its other fields stay the same."""
         if self.is_splitting:
             return tuple(choosing.orders(self.composition))
         if self.is_gauss:
@@ -90,7 +92,8 @@ class Setting:
     def described(self, kind: str = "") -> str:
         """Return the setting in words, such as ``exponential, order 8, without gauge, kahan-li``.
 
-        ``kind`` is the kind that was built, if the setting leaves the choice to phigen.
+        If ``kind`` is not empty, ``kind`` replaces the kind of the setting. Callers pass the bi-realisation that phigen
+        chose for ``auto``.
         """
         chart_name = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
         attributes = [kind or chart_name, f"order {self.order}"]
@@ -113,7 +116,9 @@ class Setting:
         return "auto" if self.kind == AUTO else self.kind if self.kind in (SPLITTING, GAUSS) else "series"
 
     def lines(self) -> list[str]:
-        """Return the lines of a spec that request this setting. Where it has `OWN`, the lines of the spec remain."""
+        """Return the lines of a spec that request this setting. Fields with the value `OWN` have no line, since the
+        spec keeps its own line.
+        """
         kind = "auto" if self.scheme != "series" else self.kind
         chart_value = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
         lines = [f"scheme: {self.scheme}"]
@@ -149,7 +154,9 @@ def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
 
 
 def own_setting(compilation: Compilation) -> Setting:
-    """Return the setting of the spec of a compilation, with the kind that phigen chose if the spec says ``auto``."""
+    """Return the setting that a compiled spec states. If the spec leaves the choice of ``kind`` to phigen, the setting
+    has the kind that phigen chose.
+    """
     spec, order = compilation.spec, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
     if compilation.scheme_name != "series":
@@ -167,9 +174,9 @@ def charts(system: System, current: Setting) -> list[Setting]:
     """Return the settings to measure first.
 
     The settings are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation
-    that might apply, at order 4. Whether a bi-realisation applies is known only when it is built. Kinds that need
-    formulas of the user are left out. If π is constant or linear, Karasev's paths are left out too, since other kinds
-    have the same maps in closed form.
+    that might apply, at order 4. Whether a bi-realisation applies is known only when it is built. Bi-realisations that
+    need formulas of the user are left out. If π is constant or linear, Karasev's bi-realisation is left out too, since
+    other bi-realisations have the same maps in closed form.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]

@@ -219,11 +219,12 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
-    """Confirm the cheapest step of a method, rounded down, by a longer run, and return the result of this run.
+    """Confirm the cheapest step size of a method by a longer run, and return the result of this run. The step size is
+    rounded down before the run.
 
     The run extends over the horizon, or over as much of it as time allows. If the run misses the accuracy, a smaller
-    step is tried, at most `ATTEMPTS` steps in all. The result is None if no step reaches the accuracy, or if there is
-    not enough time.
+    step size is tried; at most `ATTEMPTS` step sizes are tried. The result is None if no step size reaches the
+    accuracy, or if there is not enough time.
     """
     accuracy = tuner.accuracy
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]

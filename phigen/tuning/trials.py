@@ -49,7 +49,7 @@ class Point:
 #: spacing.
 Solution = Callable[[float, int], Floats]
 
-#: A measurement: function of (method, step size, time) that returns the point of the method, or None if a step fails.
+#: A measurement: function of (method, step size, duration of the run) that returns a `Point`, or None if a step fails.
 Measure = Callable[[CompiledMethod, float, float], Point | None]
 
 

@@ -134,8 +134,8 @@ class Tuner:
         return curve
 
     def peers(self) -> list[Curve]:
-        """Measure the classical methods with several steps, and return their curves. Returns [] if there is no time for
-        the measurements.
+        """Measure each classical method with several step sizes, and return the curves. Returns [] if there is no time
+        for the measurements.
         """
         current = next(iter(self.tried.values()))
         if self._race is None and current.seconds > self.clock.left(COMPARED):
@@ -196,7 +196,10 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Return the settings whose builds should end in time, estimated from lower orders; refuse all others."""
+        """Return the settings whose builds should end in time. All other settings are added to ``refused``.
+
+        The time of a build is estimated from the builds of lower orders.
+        """
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
