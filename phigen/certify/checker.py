@@ -151,11 +151,11 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # "rest" adds an error for the omitted terms of a Taylor series. Its arguments are a: a[2] is a lower bound
-            # for the divisors of the omitted terms. The C may omit the terms a[3:], and omits all later terms. The
-            # error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that contains the path, for
-            # the Taylor coefficient of the same order as a[3]. By Lagrange's form of the remainder, tail also bounds
-            # the sum of all terms from a[3] on.
+            # "rest" adds an error for the omitted terms of a Taylor series. Its arguments are the list ``a``. The
+            # number a[2] is a lower bound for the divisors of the omitted terms. The C may omit the terms a[3:], and
+            # omits all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that
+            # contains the path, for the Taylor coefficient of the same order as a[3]. By Lagrange's form of the
+            # remainder, tail also bounds the sum of all terms from a[3] on.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -171,11 +171,11 @@ class Evaluation:
             v.append(x if exact else x + BALL * error)
 
     def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
-        """Return the values of some operations, bounds for their rounding errors, and Jacobians, as matrices of
-        intervals.
+        """Return the values of the operations ``indices``, bounds for the rounding errors of the values, and Jacobians
+        of the values.
 
-        The error bounds use the mean value theorem. ``by`` maps the name of an input array to its size; there is one
-        Jacobian with respect to each of these arrays.
+        All results are matrices of intervals. The error bounds use the mean value theorem. ``by`` maps the name of an
+        input array to its size; there is one Jacobian with respect to each of these arrays.
         """
         errors, rows = list[Ball](), list[list[Ball]]()
         for output in indices:  # reverse-mode differentiation from this output back to all operations

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Functions that certificates do not cover: name of the function → the motion whose exact flow calls the function, as
-#: error messages name it.
+#: Functions that certificates do not cover. The key is the name of the function. The value is for error messages: the
+#: motion whose exact flow calls the function.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),

@@ -96,8 +96,9 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
     """Return the entries of a certificate other than boxes and bounds: the problem, and the operations of a
     step.
 
-    With ``exact``, the operations are those of the map that the step approximates; Taylor series then have the largest
-    number of terms that the C allows. Raises `RefusedError` for C that certificates do not cover.
+    With ``exact``, the operations are those of the map that the step approximates. Steps along paths use Taylor series;
+    with ``exact``, the series have the largest number of terms that the C ever computes. Raises `RefusedError` for C
+    that certificates do not cover.
     """
     facts = read(problem.text, problem.name)
     numbers = {
@@ -226,9 +227,10 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u); base is the state or 0.
+    """Return the proof data of an implicit stage.
 
-    The data are a box that contains u, and bounds for the distance of iterates from u. A new box is computed from the
+    The unknowns u of the stage solve u = b − d(u). The operations of the stage compute d, and b is the state or 0. The
+    proof data are a box that contains u, and bounds for the distance of iterates from u. A new box is computed from the
     last one until the proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
     """
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])

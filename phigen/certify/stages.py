@@ -78,10 +78,10 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of the operations that read parameters, by the names of the parameters in C. An operation is appended
-    when its parameter is first used.
+    """Indices of the operations that read parameters, by the names of the parameters in C.
 
-    ``names`` maps names in C to names in the spec.
+    When a parameter is first used, the operation that reads it is appended to ``listing``. ``names`` maps names in C to
+    names in the spec.
     """
 
     def __init__(self, listing: Listing, names: Mapping[str, str]) -> None:
@@ -92,8 +92,9 @@ class _Parameters(dict[str, int]):
 
 
 class _Gauge(dict[int, int]):
-    """Indices of the operations that read multiples of Casimirs, by the number of the Casimir. An operation is appended
-    when it is first used.
+    """Indices of the operations that read multiples of Casimirs, by the number of the Casimir.
+
+    When a multiple is first used, the operation that reads it is appended to ``listing``.
     """
 
     def __init__(self, listing: Listing) -> None:
@@ -133,8 +134,9 @@ def stages_of(
     """Return the stages of a step as lists of operations; ``facts`` is what `read` returns for the C of the
     solver.
 
-    If ``exact``, Taylor series of paths have the largest number of terms that the C allows. Otherwise they have the
-    number of terms that the C may use for states in the box ``centre``.
+    Steps along paths use Taylor series. The C ends a series at small terms, so the number of terms depends on the
+    state. If ``exact``, the series have the largest number of terms that the C ever computes. Otherwise they have the
+    largest number of terms that the C computes for states in the box ``centre``.
     """
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":
@@ -289,9 +291,10 @@ def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: 
 def _along_path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, max_terms: int, coordinate: int
 ) -> Stage:
-    """Return stage ``k`` of a step along paths, whose Taylor series have ``least`` to ``max_terms`` terms.
+    """Return stage ``k`` of a step along paths.
 
-    The series of coordinate number ``coordinate`` has a large term, so that the C cannot end it before ``least`` terms.
+    The C computes the Taylor series of each path with ``least`` to ``max_terms`` terms. It computes at least ``least``
+    terms because the series of coordinate number ``coordinate`` has a large term.
     """
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
