@@ -228,7 +228,7 @@ class _Module:
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
         # ``right_factors`` has the matrix of the map a ↦ τ(a, f) for each basis element f of S. The head of the file
-        # defines τ.
+        # defines S and τ.
         right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:

@@ -19,11 +19,10 @@ Rates = dict[tuple[int, int], Expression]
 
 
 def logarithmic(coordinates: Sequence[str], poisson: Matrix) -> Rates | None:
-    """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j), if all brackets are constant in suitable
-    logarithms.
+    """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j).
 
-    The condition is {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and exponents e_i = 0 or 1. The result has the
-    brackets for all i with e_i = 1. Returns None if there are no such exponents.
+    All brackets {x_i, x_j} must have the form c_ij x_i^e_i x_j^e_j, as in the head of the file. The result has the
+    brackets for all i with e_i = 1. Returns None if a bracket has another form, or if all e_i are 0.
     """
     pairs = [(i, j) for i, row in enumerate(poisson) for j in range(i) if not row[j].is_zero]
     terms = coordinate_terms(coordinates, [poisson[i][j] for i, j in pairs])

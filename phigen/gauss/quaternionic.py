@@ -25,8 +25,8 @@ from phigen.symbolic.tower import rational
 #: Linear map from a Lie algebra to itself, as a sparse matrix: (row, column) → entry.
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest dimension of a Lie algebra for which phigen looks for a form β. The search solves linear equations, whose
-#: number of unknowns grows as the third power of the dimension.
+#: Largest dimension of a Lie algebra for which phigen looks for a map β as in the head of this file. The search solves
+#: linear equations, whose number of unknowns grows as the third power of the dimension.
 MOST_QUATERNIONIC = 12
 
 

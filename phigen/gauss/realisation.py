@@ -73,7 +73,9 @@ class AlgebraBlock:
 
     @property
     def subalgebra(self) -> tuple[int, ...]:
-        """The basis elements of the star algebra outside ``ideal``: the components of G along these are unknowns."""
+        """The basis elements of the star algebra that are not in ``ideal``. The components of G along these elements
+        are unknowns.
+        """
         return tuple(i for i in range(self.algebra.dimension) if i not in self.ideal)
 
     @property
@@ -107,7 +109,9 @@ class Realisation:
 
     @property
     def with_elements(self) -> Realisation:
-        """The realisation without functionals: all components of the group elements are unknowns."""
+        """The realisation in which all components of the group elements are unknowns. No functional λ replaces
+        components (`phigen.gauss.square_zero`).
+        """
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
 
@@ -143,7 +147,7 @@ def direct(system: System) -> Realisation:
 
 
 def collective(system: System) -> Realisation | None:
-    """Return an exact realisation, whose step is a Poisson map; None if phigen knows none."""
+    """Return a realisation with which a Gauss step is exactly a Poisson map; None if phigen knows none."""
     parts = _parts(system.coordinates, system.poisson, system.shape)
     return None if parts is None else Realisation(tuple(_merged_parts(parts)), True)
 
@@ -203,9 +207,9 @@ def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
 
 
 def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
-    """Yield the parts with all plain parts merged into one, and all logarithmic parts merged into one.
+    """Yield at most one `Plain` part, then at most one `LogarithmicBlock`, then each `AlgebraBlock`.
 
-    First comes the plain part, then the logarithmic part, then the parts with Lie algebras.
+    All `Plain` parts are merged into one, and all `LogarithmicBlock` parts are merged into one.
     """
     plain_indices = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain_indices:

@@ -20,12 +20,12 @@ from phigen.gauss.star_algebra import StarAlgebra
 
 
 def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
-    """Return the basis elements of a square-zero ideal N of a star algebra A, which reduces the number of unknowns of a
-    step.
+    """Return the basis elements of a square-zero ideal N of a star algebra A.
 
-    A = N ⊕ B with a subalgebra B, and 2 dim B ≤ dim A. N is the radical of the bilinear form tr ab. Returns () if there
-    is no ideal with these properties, or if N and B are not spanned by basis elements. The result is also () if one of
-    the elements in ``algebra.frame``, by which momenta are computed, is neither in N nor in B.
+    The ideal reduces the number of unknowns of a step. A = N ⊕ B with a subalgebra B, and 2 dim B ≤ dim A. N is the
+    radical of the bilinear form tr ab. Returns () if there is no ideal with these properties, or if N and B are not
+    spanned by basis elements. The result is also () if one of the elements in ``algebra.frame``, by which momenta are
+    computed, is neither in N nor in B.
     """
     n, zero = range(algebra.dimension), algebra.field.zero
     products = {at: row for at, row in algebra.table.items() if row}

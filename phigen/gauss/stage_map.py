@@ -261,9 +261,9 @@ def _form_change(
 
 
 def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the momenta x̃(G E_a G*) of a group element G, with the functional x̃ of the star algebra, for all a.
+    """Return the momentum x̃(G E_a G*) for each basis element E_a of the Lie algebra.
 
-    E_a is the basis of the Lie algebra; ``places`` are the indices of the unknowns of G.
+    G is a group element, and x̃ the functional of the star algebra. ``places`` are the indices of the unknowns of G.
     """
     at_frame, combination = _at_frame(points, group, places)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
@@ -288,8 +288,9 @@ def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> t
 def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
     """Return x̃(Gb)/q for a group element G and the basis elements b of the star algebra.
 
-    x̃ is the functional of the momenta, and q a number (`_Scaled`). If the group has an ideal, there is an unknown
-    functional λ. For elements b of the subalgebra, the result then has λ(b)/q instead.
+    x̃ is the functional of the momenta, and q a number (`_Scaled`). If ``group.ideal`` is not empty, an unknown
+    functional λ on the subalgebra replaces the components of G in the ideal (`phigen.gauss.square_zero`). Then the
+    result has λ(b)/q in place of x̃(Gb)/q for elements b of the subalgebra.
     """
     scaled = _scaled(group, group_values(points.system, group))
     left = _functional_times(group.algebra, scaled, _element_at(points, group, places))
@@ -372,8 +373,9 @@ def vector_field(
 
     ``stage_values`` has the coordinates and the time at the stage by name. ``slopes`` replaces ∇H if it is not None.
     Group elements follow Ġ = Gξ with a velocity ξ in the Lie algebra; ``hold`` replaces each component of ξ by another
-    expression. If ``collected``, components of ξ that are affine in the momenta are written in a shorter form: as
-    linear combinations of the values x̃(G f G*), with the elements f in ``frame`` of the `StarAlgebra`.
+    expression. If ``collected``, components of ξ that are affine in the momenta have a shorter form: they are linear
+    combinations of the values x̃(G f G*). Here x̃ is the functional of the star algebra, and f runs over the elements
+    in ``frame`` of the `StarAlgebra`.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -421,11 +423,12 @@ def _derivatives(
 
 
 def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return the offset λ − λ_start of the functional λ, which replaces the components of a group element G in a
-    square-zero ideal (see `phigen.gauss.square_zero`).
+    """Return the offset (λ − λ_start)/q of the functional λ of `phigen.gauss.square_zero`, with the number q of
+    `_Scaled`.
 
-    ``w`` = G − 1 has all components, also those in the ideal. ``x`` are the values of the basis elements of the Lie
-    algebra at the start, see `group_values`.
+    λ replaces those components of a group element G that are in the square-zero ideal. ``w`` = G − 1 has all
+    components, also those in the ideal. ``x`` are the values of the basis elements of the Lie algebra at the start, see
+    `group_values`.
     """
     doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
     left = _functional_times(group.algebra, _scaled(group, x), doubled)

@@ -212,10 +212,10 @@ def _differences(
 
 
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
-    """Return the unknowns of ``points`` by name, as functions of the unknowns of ``complete``.
+    """Return a map from the names of the unknowns of ``points`` to expressions in the unknowns of ``complete``.
 
-    In ``complete``, all components of group elements are unknowns. In ``points``, functionals λ replace the components
-    in square-zero ideals (`phigen.gauss.square_zero`).
+    Both arguments describe the stages of the same step. In ``complete``, all components of group elements are unknowns.
+    In ``points``, functionals λ replace the components in square-zero ideals (`phigen.gauss.square_zero`).
     """
     first, size = len(points.moved) + len(points.system.times), len(points.scaled)
     common = [*range(first), *range(points.plain, points.plain + size)]
@@ -231,8 +231,10 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Decide two statements on a stage whose unknowns are all 0: the state at the stage is the state at the start of
-    the step, and its derivative is π∇H.
+    """Decide two statements on a stage whose unknowns are all 0.
+
+    First, the state x at the stage is the state at the start of the step. Second, ẋ = π∇H, where ẋ follows from the
+    derivatives of the unknowns.
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]

@@ -222,7 +222,7 @@ def _nearest(value: Fraction, spacing: Fraction) -> Fraction:
 
 
 def _skew_by(times: Sequence[Fraction], exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[Fraction]]:
-    """Return the matrix ν = μ diag(b) μ of a Gauss method, rounded such that ν_ij − ν_ji = τ_i − τ_j exactly.
+    """Return the matrix ν of a `Tableau`, rounded such that ν_ij − ν_ji = τ_i − τ_j exactly.
 
     ``exact`` is ν before rounding, and ``times`` are the rounded nodes τ_i. The entries of the result are multiples of
     ``spacing``.
