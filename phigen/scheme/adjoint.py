@@ -117,10 +117,11 @@ def gauss_adjoint(
 ) -> list[Kernel]:
     """Return three kernels that together transpose a Gauss step.
 
-    Let the method have the weights w_j, which contain the step size, and the coefficients μ_ij. The stages Z_i solve
-    Z_i = Σ_j μ_ij L_j with the increments L_j = w_j f(x, Z_j), where f is the vector field. The new state is x' = x +
-    D(x, Σ_j L_j). Let λ be the cotangent of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy
-    ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations.
+    Let the method have the weights w_j, which contain the step size, and the coefficients μ_ij. A step starts at x. Let
+    z be the unknowns of a stage, and f(x, z) their vector field. The stages Z_i solve Z_i = Σ_j μ_ij L_j with the
+    increments L_j = w_j f(x, Z_j). The new state is x' = x + D(x, Σ_j L_j), with a map D(x, z). Let λ be the cotangent
+    of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j
+    μ_ji ζ_j. Fixed-point sweeps solve these equations.
 
     The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes the contribution of
     one stage to the cotangents of x and of the coefficients. The third kernel is the transpose of D.

@@ -116,7 +116,7 @@ class Schedule:
 
     @property
     def rows(self) -> int:
-        """The number of rows of ``times`` that belong to one stage."""
+        """The number of entries that the list ``times`` has for each stage."""
         of_step = len(self.times) - len(self.begin) - len(self.end)
         return (of_step - 1) // self.stages if self.stages else 0
 

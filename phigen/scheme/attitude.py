@@ -75,9 +75,10 @@ def stage_attitude(
 def gauss_attitude(
     system: System, group: Group, points: StageMap, coefficients: Coefficients, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of a Gauss step; the coefficients of its kernels are added to ``coefficients``.
+    """Return the kernels for the attitude in a Gauss step.
 
-    Raises `SpecError` if phigen knows no group element of the step.
+    The coefficients of these kernels are added to ``coefficients``. Raises `SpecError` if phigen knows no group element
+    of the step.
     """
     series = "scheme: series or splitting"
     if not points.realisation.exact:
@@ -145,7 +146,7 @@ def flow_attitude(
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """Return the attitude of a splitting.
+    """Return the kernels for the attitude in a splitting.
 
     The result has one kernel for each flow, which computes the increments of the flow and the group element of the step
     up to the end of this flow. ``increments`` has the increments of all flows: first those of noise sources, then those

@@ -218,8 +218,10 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
 
 
 def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kick) -> ScheduledMethod:
-    """Return the Nyström method for H = T + V, with T and V in the order of its step, and the reason for the choice as
-    text."""
+    """Return a Nyström method for H = T + V together with the reason for its choice, as text.
+
+    The parts T and V come in the order in which a step applies their flows.
+    """
     return ScheduledMethod(order, method, _arranged(splitting, method, kick), _why(method))
 
 

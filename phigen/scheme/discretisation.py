@@ -144,9 +144,9 @@ def discretise(
     """Return the series of the requested order for the whole step, or a composition of steps of order 2.
 
     A composition is used if the spec asks for it. With ``auto`` it is used only if the direct series has too many
-    operations, or costs more than `MAX_DIRECT_COST_RATIO` times all stages of the composition. The direct series may
-    cost more because its error constant is much smaller. ``affordable`` says that `expect_affordable` has already
-    passed.
+    operations, or costs more than `MAX_DIRECT_COST_RATIO` times all stages of the composition. This ratio is larger
+    than 1, since the direct series has a much smaller error constant. ``affordable`` says that `expect_affordable` has
+    already passed.
     """
     if system.noise:
         expect_noise(system, realisation, order, composition)

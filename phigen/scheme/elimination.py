@@ -75,7 +75,7 @@ class Factors:
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:
-        """Return a copy of the factors with numbered symbols of the kind ``kind`` in place of the `values`."""
+        """Return a copy of the factors in which ``Symbol(kind, 0)``, ``Symbol(kind, 1)``, … replace the `values`."""
         names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}

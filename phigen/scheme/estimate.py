@@ -66,8 +66,10 @@ def may_have(dimension: int, limit: int) -> bool:
 
 
 def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) -> int:
-    """Return the number of operations of the matrix Hess S_h · π in a step along paths; ``limit`` + 1 if there are
-    more."""
+    """Return how many operations compute the matrix Hess S_h · π for a step along paths.
+
+    S_h is the generating function. The result is ``limit`` + 1 if there are more than ``limit`` operations.
+    """
     tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
     count = OperationCount(limit, lambda name: name not in system.coordinates)
     try:

@@ -86,7 +86,7 @@ def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coeffici
 
 
 def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the increment of the coordinates in a step, from the unknowns at its end."""
+    """Return the kernel that computes the increment of the coordinates from the unknowns at the end of a step."""
     return Kernel(
         "stage_change",
         "the increment of the coordinates from x, as a function of the unknowns",

@@ -46,7 +46,9 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """The covector p that rotates a body in a step. It omits forces, since they act only on the momentum."""
+        """The covector p from which the rotation of a body is computed. Forces do not contribute to p: they change only
+        the momentum.
+        """
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:

@@ -51,7 +51,7 @@ def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expressio
 def is_centred(system: System, realisation: BiRealisation) -> bool:
     """Whether the solution y of the implicit equation is the mean of the ends x and x' of the step.
 
-    Then the derivative of the increment β − α is 2(1 − J), where J is the derivative of α.
+    Then the derivative of the increment β − α with respect to y is 2(1 − J), where J is the Newton matrix.
     """
     half = number(Fraction(1, 2))
     means = [a + half * d for a, d in zip(*ends(system, realisation), strict=True)]
@@ -137,7 +137,7 @@ def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
 
 
 def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
-    """Return the entries that may be nonzero in the Newton matrix, and in the derivative of the increment of a step."""
+    """Return two patterns: of the Newton matrix, and of the derivative of the increment β − α with respect to y."""
     _, _, jacobian, slope = linearised.outputs
     return _pattern(jacobian.values), _pattern(slope.values)
 
@@ -172,7 +172,8 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
     """Return Gaussian elimination as two kernels: one factorises the matrix once, the other then solves for many
     right-hand sides.
 
-    The second kernel also multiplies each solution by the derivative of the increment, whose pattern is ``slope``.
+    The second kernel also multiplies each solution by a matrix K, the derivative of the increment β − α with respect to
+    y. ``slope`` is the pattern of K.
     """
     n, factor_symbols = len(slope), factors.named("f")
     side = tuple(Symbol("r", i) for i in range(n))
@@ -195,9 +196,9 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
 
 
 def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
-    """Return the kernel that computes J⁻¹ and K J⁻¹ for a matrix J.
+    """Return the kernel that computes J⁻¹ and K J⁻¹ for the Newton matrix J.
 
-    K is the derivative of the increment β − α; it is 2(1 − J) if the step is ``centred``.
+    K is the derivative of the increment β − α with respect to y. If the step is ``centred``, K = 2(1 − J).
     """
     n = len(pattern)
     entries, reciprocals = inversion(pattern)

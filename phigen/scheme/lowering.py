@@ -87,7 +87,7 @@ def _integer_power(base: Expression, n: int) -> Expression:
 
 
 def cost(roots: Sequence[Expression]) -> int:
-    """Return the cost of computing the roots together, in units of an addition (`COST`); a shared value counts once."""
+    """Return the cost of the expressions ``roots`` in units of an addition (`COST`); a shared value counts once."""
     return sum(_cost(e) for e in topological(expand_powers(roots)))
 
 
@@ -102,7 +102,7 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with products such as ½(ab) and ½(ac) written as (½a)b and (½a)c, if this saves operations."""
+    """Return the expressions ``roots`` with ½(ab) and ½(ac) written as (½a)b and (½a)c, if this saves operations."""
     roots = list(roots)
     while True:
         regrouped = _numbers_regrouped(roots)
@@ -112,7 +112,7 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with products such as ½(ab), a number times a product, rewritten as (½a)b.
+    """Return the expressions ``roots`` with products such as ½(ab), a number times a product, written as (½a)b.
 
     The number is multiplied with the factor that occurs in the most products with the same number. A product ½(ab)
     remains unchanged if neither a nor b occurs in another product with the number ½.

@@ -114,9 +114,10 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
 def _method_from_halves(
     name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]
 ) -> NearIntegrable:
-    """Return the method for H = A + εB with ``stages`` flows of εB, from the first halves of the fractions a and b.
+    """Return the method for H = A + εB with ``stages`` flows of εB.
 
-    The halves include the middle values.
+    The fractions of the step for the flows of A form a symmetric list a, and those for εB a symmetric list b.
+    ``halves`` has the first half of a and the first half of b, each with the middle value.
     """
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))

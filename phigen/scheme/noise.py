@@ -1,5 +1,5 @@
 """Noise in splittings: the flows of the noise sources run for half a step before and half a step after the flows of H.
-This module also has the header lines about noise.
+This module also writes the lines about noise in the comment at the head of generated files.
 
 The increments of the two halves are independent. So the mean of a step is exp(hN/2) exp(hA) exp(hN/2), where A is the
 generator of the flow of H, and N = ½ Σ X² the generator of the noise along the fields X. Since the order of the sources

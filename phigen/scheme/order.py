@@ -1,4 +1,4 @@
-"""The order of a method, and the number of terms S_i of the generating function with which it has this order."""
+"""The order of a method, and the number of its terms S_1, S_2, … or of its stages."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """Transposes of sums over the bonds or pairs of each site of a lattice: a site collects its cotangents from its
 bonds.
 
-A site is the end a of some bonds and the end b of others. Often the sum at b equals the sum at a up to its sign, as for
-forces between two sites. Then one formula is sufficient: the contribution that a site receives as end b is the formula
-of the end a, applied to the cotangents of the site at the other end. This formula is a Hessian times one vector, and
-the Hessian is that of the energy of the pair.
+A site is the end a of some bonds and the end b of others. A bond adds one term at its end a, and one term at its end b.
+Often these terms are equal up to the sign, as for forces between two sites. Then one formula is sufficient: the
+transpose of the term at a, applied to the sum or the difference of the cotangents of the two sites. For forces, this
+formula is a matrix times a vector; the matrix is the Hessian of the energy of the pair.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Ke
 def paired(
     ends: Mapping[str, tuple[str, str]], kernel: Kernel, transpose: Kernel, opposite: Collection[str] = ()
 ) -> Kernel:
-    """Return the transpose of a kernel of bonds or pairs, with all contributions of a bond added to its site a.
+    """Return the transpose of a kernel of bonds or pairs, with all contributions of a bond added at its end a.
 
     ``ends`` maps each symbol to a pair: a field or parameter, and an end. ``opposite`` lists the parameters of bonds
     that change their sign if the two ends of a bond are exchanged. Some outputs contribute to sums over the whole

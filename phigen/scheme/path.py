@@ -60,8 +60,8 @@ class Recurrences:
     """The Taylor series of a path: series 0 … n−1 are the coordinates m_i, and series number ``slopes[i]`` is that of
     ṁ_i.
 
-    ``fixed`` are values that are constant along a path. They depend on p and on the coefficients; their symbols are
-    ``f:i``.
+    ``fixed`` are values that are constant along a path; their symbols are ``f:i``. They depend on p and on the
+    coefficients of the step.
     """
 
     series: tuple[NodeSeries, ...]

@@ -25,7 +25,7 @@ class Policy:
     """Base class for groups of constants that belong together; subclasses define each constant as a field."""
 
     def constants(self) -> Iterator[PolicyConstant]:
-        """Yield the constants of the group, with the names that they have in generated code."""
+        """Yield the constants that the class defines, with their names in generated code."""
         for constant in fields(self):
             yield PolicyConstant(constant.name.upper(), getattr(self, constant.name), constant.metadata["about"])
 
@@ -70,7 +70,7 @@ class NewtonPolicy(Policy):
 
 @dataclass(frozen=True)
 class PathPolicy(Policy):
-    """The solution of the equation for p in a step along paths dm/dt = π(m)p, and the Taylor series of a path.
+    """Constants for steps along paths dm/dt = π(m)p: for the iteration that computes p, and for Taylor series.
 
     A long path is divided into pieces, each of which has a Taylor series. ``longest_path`` and ``most_pieces`` were
     chosen by measurements with the example systems in ``specs``: steps that need more pieces usually have errors as
@@ -240,7 +240,7 @@ class LatticeNewtonPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeTangentPolicy(Policy):
-    """The linear equation for a tangent vector of a step of a lattice, solved by iterative corrections."""
+    """Constants for tangent maps of lattices. A linear equation for the new tangent vector is solved by iteration."""
 
     carried: float = number(
         2.0**-54, "a residual below this fraction of the tangent vector consists of rounding errors"

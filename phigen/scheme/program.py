@@ -88,9 +88,9 @@ class Monitor:
     """Kernels of a solver with a monitor, whose steps have equal size in the rescaled time τ.
 
     ``rate`` is dt/dτ at a state. ``elapsed`` is the physical time of a step, as a function of the solution y of its
-    implicit equation; in a splitting it is None, since the kernels of the flows return their time. ``level`` is the
-    gradient of H, or None if no gradients were requested. The reverse pass needs it, because the energy level e =
-    −H(x₀) depends on the start x₀.
+    implicit equation; in a splitting it is None, since the kernels of the flows return their time. ``level`` is ∇H, or
+    None if no gradients were requested. The reverse pass needs ∇H, because the energy level e = −H(x₀) depends on the
+    start x₀.
     """
 
     rate: Kernel

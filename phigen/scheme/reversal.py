@@ -44,7 +44,10 @@ def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
 
 
 def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
-    """Return the values with the time h replaced by −h; ``parities`` has the parities of symbols in h."""
+    """Return the values with the time h replaced by −h.
+
+    ``parities`` says for each symbol whether it is an odd or an even function of h: `ODD`, `EVEN` or `NEITHER`.
+    """
     return [reversed_value for _, reversed_value in _parities(values, parities)]
 
 
@@ -124,7 +127,10 @@ def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> li
 
 
 def _parity(node: Expression, of_args: Sequence[int]) -> int:
-    """Return the parity of a node of an expression from the parities of its arguments."""
+    """Return whether a node of an expression is an odd or an even function of h: `ODD`, `EVEN` or `NEITHER`.
+
+    ``of_args`` has the same information for each argument of the node.
+    """
     if all(parity == EVEN for parity in of_args):
         return EVEN
     first = of_args[0]

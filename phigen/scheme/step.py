@@ -35,9 +35,10 @@ SparseRow = dict[int, Expression]
 
 @dataclass(frozen=True)
 class Linearised:
-    """The vectors and matrices of a Newton iteration at y: α − y and β − α (n entries), and their Jacobians (n×n).
+    """The vectors and matrices of a Newton iteration at y, with p = ∇S_h(y).
 
-    ``jacobian`` is that of α, the Newton matrix J; ``increment_jacobian`` is that of β − α. All are at p = ∇S_h(y).
+    ``displacement`` is α − y, and ``increment`` is β − α. ``jacobian`` is the Newton matrix J, the derivative of α with
+    respect to y. ``increment_jacobian`` is the derivative of β − α with respect to y.
     """
 
     displacement: list[Expression]
@@ -119,8 +120,11 @@ def explicit_increment(
     coordinates: Sequence[str],
     order: Sequence[int],
 ) -> list[Expression]:
-    """Return the increment of an explicit step as a function of x: y = x − a(y) is solved by substitution in
-    ``order``."""
+    """Return the increment of an explicit step as a function of x.
+
+    The equation y = x − a(y), where a is ``displacement``, is solved by substitution, one component of y after another.
+    ``order`` lists the indices of the components.
+    """
     solutions: dict[str, Expression] = {}
     for i in order:
         (shift,) = substitute([displacement[i]], solutions)

@@ -28,10 +28,10 @@ class PathAdjoint:
     """The kernels and recurrences that transpose a step along a path; the formulas are in
     `phigen.scheme.adjoint`.
 
-    ``recurrences`` follow the path backwards, together with cotangents; the cotangents of coefficients come last.
-    ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and its Hessian at the mean of the path.
-    ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the
-    derivatives of a path, by which many paths are transposed at once.
+    ``recurrences`` follow the path backwards, together with cotangents. The last of these cotangents are those of the
+    coefficients that the path reads; ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and
+    its Hessian at the mean of the path. ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes``
+    are the recurrences for the derivatives of a path. With these derivatives, many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -73,7 +73,7 @@ class _Staged:
     refresh: Kernel | None = field(default=None, kw_only=True)
     adjoint: Adjoint | None = field(default=None, kw_only=True)
 
-    #: The record of the kind of step, which the subclass sets.
+    #: The kind of step. Each subclass sets this attribute.
     kind: ClassVar[StepKind]
 
     @property
@@ -135,7 +135,7 @@ class _Staged:
 
     @property
     def path(self) -> Recurrences | None:
-        """The recurrences of the path that a step follows; None for steps that follow no path."""
+        """The recurrences for the Taylor series of the path that a step follows; None for steps that follow no path."""
         return None
 
     @property
@@ -309,7 +309,7 @@ class PathLanes:
 
 @dataclass(frozen=True)
 class PathTangent:
-    """Parts of a step along a path that its tangent map needs.
+    """Recurrences and a kernel for the tangent map of a step along a path.
 
     ``recurrences`` compute the path and its variation (`phigen.scheme.tangent`). ``curvature`` computes ∇S_h and Hess
     S_h at the mean of the path.
@@ -483,7 +483,7 @@ class _Scheduled(_Staged):
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one step. There is a row of coefficients for each duration in the schedule."""
+        """The number of coefficients of one step. The table of coefficients has a row for each duration of a flow."""
         return self.row * len(self.schedule.times)
 
 
@@ -534,8 +534,8 @@ class Seam:
 
     @property
     def min_size(self) -> int:
-        """The smallest allowed size of the axis: the number of sites of the longest possible seam, plus the number
-        ``wide``.
+        """The smallest allowed size of the axis: that of the longest possible seam, ``wide`` + ``period`` − 1 sites,
+        plus ``wide`` sites.
         """
         return 2 * self.wide + self.period - 1
 
@@ -604,7 +604,7 @@ class Gather:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """The kernels that compute the terms of the sums: one kernel for each item of ``ends``."""
+        """The kernels that compute what a bond or pair adds to the sums: one kernel for each item of ``ends``."""
         return tuple(e.kernel for e in self.ends)
 
 
@@ -762,7 +762,7 @@ class Sweeps(_Scheduled):
 
     @property
     def swept(self) -> Sweeps:
-        """The step itself, since it is the step of a lattice."""
+        """The step itself. In other classes of steps, this property is None."""
         return self
 
     @property
@@ -814,7 +814,7 @@ class Sweeps(_Scheduled):
 
     @property
     def sums(self) -> int:
-        """The largest number of sums over bonds or pairs that are stored for each site at one time."""
+        """The largest number of sums in a `Gather` of the step. Each site has memory for this number of values."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 

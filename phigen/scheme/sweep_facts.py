@@ -37,7 +37,9 @@ def band(step: Sweeps) -> int:
 
 
 def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep is restricted by boundary seams: it omits the sites near seams, or updates no others."""
+    """Whether a sweep is restricted by boundary seams: the sweep omits the sites near seams, or updates only sites near
+    seams.
+    """
     return sweep.omits_seams or sweep.window is not None
 
 
@@ -103,10 +105,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether cotangents that a flow passes to other sites of a grid are added by the loop of the next flow in the
-    reverse pass, instead of by separate loops.
+    """Whether, in the reverse pass on a grid, the loop of a flow also adds the cotangents that the flow before it
+    passed to other sites. Otherwise separate loops add these cotangents.
 
-    Loops that add these cotangents are long, and are used only in the profile ``fast``.
+    Loops that also add cotangents are long, and are used only in the profile ``fast``.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
@@ -119,9 +121,8 @@ def takes(program: Program, step: Sweeps) -> bool:
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
     """Return for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
 
-    If the function `takes` returns true, only the first flow of a step needs separate loops. The cotangents from any
-    other flow are added by the loop of the flow that follows in the reverse pass. The reverse pass of a step ends with
-    the first flow.
+    If `takes` is true, the loop of the next flow in the reverse pass adds the cotangents. Then only the first flow of a
+    step needs separate loops, since the reverse pass of a step ends with this flow.
     """
     first = step.schedule.flows[0][0] if takes(program, step) else None
     return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]

@@ -43,8 +43,9 @@ def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps]
 
 @once
 def can_recompute_fields(program: Program, step: Sweeps) -> bool:
-    """Whether the reverse pass of a step can recompute the fields before each sweep by the inverse flow, instead of
-    storing them."""
+    """Whether the reverse pass can compute the fields before a sweep from those after it, by the inverse flow.
+    Otherwise the fields before each sweep are stored.
+    """
     if not step.adjoint or step.equation:
         return False
     parities, sweeps = of_coefficients(step), [sweep for part in step.parts for sweep in part]

@@ -53,8 +53,8 @@ def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
     """Return the recurrences of a path ṁ = π(m)p together with its variation v.
 
     v is due to variations of the start and of p. With the variation w of p, v̇ = ∂_m(π(m)p) v + π(m) w. The coordinates
-    of the recurrences are first the x, then the components ``v:x`` of v. The symbols for the components of w are those
-    that momenta of the coordinates ``v:x`` have.
+    of the recurrences are first the x, then the components ``v:x`` of v. The components of w have the symbols
+    ``p:v:x``.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]
