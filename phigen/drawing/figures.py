@@ -77,7 +77,7 @@ def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | 
 def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
     """Return a figure of Poincaré sections; ``sections`` maps labels to arrays of points (rows, DIM).
 
-    The figure shows the plane of two of the coordinates ``names``.
+    ``names`` lists the DIM coordinates. Two of these coordinates, which `section_plane.plane_of` chooses, are drawn.
     """
     figure = _figure(_SECTION, NARROW)
     section_plane.draw_section(figure.add_subplot(), sections, names)

@@ -80,7 +80,10 @@ def _flat(values: Floats) -> Floats:
 
 
 def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> Any:
-    """Draw a coordinate on a graph. Return a function that replaces the drawn values by those of an array (sites,)."""
+    """Draw the values of a coordinate at the sites of a graph.
+
+    Return a function that replaces the drawn values by those of an array (sites,).
+    """
     values = run.column(name)
     picture = draw_sites(axes, run.parameters["bonds"], positions, values[0], shades_of(values))
     axes.set_title(name)

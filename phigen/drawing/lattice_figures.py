@@ -204,7 +204,7 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
 def _draw_graph(
     part: Any, name: str, run: LatticeTrajectory, values: Floats, positions: Floats, site_names: Sequence[str] = ()
 ) -> None:
-    """Draw one coordinate of a graph at several times."""
+    """Draw the values of one coordinate at the sites of a graph, at several times."""
     frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):

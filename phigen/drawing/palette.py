@@ -122,7 +122,7 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
 def save(figure: Figure, path: str | Path, origin: str = "") -> None:
     """Write a figure as PNG, SVG or PDF, by the suffix of the path; equal figures give equal bytes.
 
-    The metadata name phigen and contain the text ``origin``, but no date.
+    The metadata contain the name phigen and the text ``origin``, but no date.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:

@@ -140,7 +140,10 @@ def _draw_faded(
     axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
     alphas: tuple[float, float], order: float, as_curve: bool = True,
 ) -> None:  # fmt: skip
-    """Draw points (rows, 3) as a curve in bands by their distance from the viewer; each band has one shade."""
+    """Draw points (rows, 3) as a curve, or as dots if ``as_curve`` is False.
+
+    The distances from the viewer are divided into `BANDS` bands. The points of a band have one shade.
+    """
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)

@@ -82,7 +82,7 @@ def gathered(
     parameters: Mapping[str, float],
     orders: Sequence[int] = ORDERS,
 ) -> Live:
-    """Return the panel for a run, with solvers in JavaScript for the order of the page and for ``orders``."""
+    """Return the panel for a run, with solvers in JavaScript for the order of the compilation and for ``orders``."""
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
     by_order, why_not = solvers(compilation, scheme, orders)
@@ -272,9 +272,9 @@ def _groups(system: System) -> list[Group]:
 def _leaf(system: System, group: Group) -> int | None:
     """Return the index of the Casimir whose level surface is drawn; None if no surface is drawn.
 
-    A surface is drawn if the group has three coordinates, and a conserved Casimir depends on these coordinates only. If
-    the system has only two coordinates and conserves its energy, the level curve of the energy is drawn instead, and
-    the result is −1.
+    ``group`` lists the coordinates that are drawn together. A surface is drawn if there are three of these coordinates,
+    and a conserved Casimir depends on these coordinates only. If the system has only two coordinates and conserves its
+    energy, the level curve of the energy is drawn instead, and the result is −1.
     """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None

@@ -179,7 +179,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def typeset(text: str) -> Markup:
-    """Return plain text with formulas such as S_1, h^2 and 3e-16 in mathematical notation."""
+    """Return plain text as HTML, with subscripts and superscripts in formulas such as S_1, h^2 and 3e-16."""
     markup = str(escape(text))
     markup = _SUBSCRIPT.sub(r"<sub>\1</sub>", markup)
     markup = _POWER.sub(r"<sup>\1</sup>", markup)
