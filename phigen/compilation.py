@@ -334,7 +334,7 @@ class CompiledSeries(_CompiledSystem):
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
-        """Return this compilation. Compilations with other schemes raise `ValueError`."""
+        """Return this compilation, whose scheme is a series. For other schemes, `ValueError` is raised."""
         return self
 
     def by_kind(
@@ -385,12 +385,15 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def unused(self) -> list[tuple[str, ...]]:
-        """Paths of the keys of the spec that have no effect, such as a tolerance: flows are exact."""
+        """Paths of those keys of the spec that have no effect on a splitting.
+
+        One example is ``tolerance``: the flows are exact, so no equation is solved by iteration.
+        """
         paths_of_solver = [("solver", key) for key in self.spec.solve_settings]
         return [*((key,) for key in self.spec.series_settings), *paths_of_solver]
 
     def by_splitting(self) -> CompiledSplitting:
-        """Return this compilation. Compilations with other schemes raise `ValueError`."""
+        """Return this compilation, whose scheme is a splitting. For other schemes, `ValueError` is raised."""
         return self
 
     def by_kind(
@@ -461,7 +464,7 @@ class CompiledGauss(_CompiledSystem):
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
-        """Return this compilation. Compilations with other schemes raise `ValueError`."""
+        """Return this compilation, whose scheme is Gauss collocation. For other schemes, `ValueError` is raised."""
         return self
 
     def by_kind(
@@ -546,8 +549,10 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return ``method``, a line of text that names the method. If the sizes in runs are the reason for the colours,
-        for a seam or for the series, the line also states this reason.
+        """Return ``method``, a line of text that names the method.
+
+        The lattice sizes in the runs of the spec can be the reason for the colours, for a seam or for the scheme
+        ``series``. Then the line also states this reason.
         """
         if not self.sweeps.since:
             return method

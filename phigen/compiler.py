@@ -263,7 +263,7 @@ def _compile_series(
 def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """Compile by the scheme that is expected to reach the accuracy of the requested order in the least time.
 
-    The series is not built if a series of lower order shows that it would take more time than another scheme. If no
+    The series of the requested order is not built if a series of lower order shows that another scheme is faster. If no
     scheme applies, the error of the series is raised.
     """
     compilations: dict[str, Compilation] = {}
@@ -352,9 +352,10 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """Return H as a sum of parts, each with its flow.
 
-    With the key ``coordinates_from``, there is one part for each body. Otherwise some parts may be known motions, such
-    as Kepler motions, and `_turns_bodies` decides whether free rigid bodies may be parts. There are no known motions if
-    the spec has a monitor. There are none if the spec names a composition and the whole of H is one known motion.
+    With the key ``coordinates_from``, there is one part for each body. Otherwise the flow of a part may be a motion,
+    such as a Kepler motion. `_turns_bodies` decides whether motions of free rigid bodies are allowed. If the spec has a
+    monitor, H is split without motions. H is also split without motions if the spec names a composition, and the flow
+    of H itself is a motion.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
