@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: e8339a322ac13545e452775d7821296b271f8f0fec30118040945c8bea06a093
+ * body-sha256: 6c9e872d02d3c7684730151923cfc851d859d2f626ea7ee5f9d5d4e2598e7bc9
  */
 #include "duffing.h"
 #include <float.h>
@@ -228,8 +228,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of a step longer than PLAUSIBLE */
+#define duffing_PLAUSIBLE 1.5         /* largest plausible increment, relative to |x| + |h dx/dt| */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of an increment beyond PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1a61f3b1bce90c1c8566620b71364285f663c6cff5800aa8bc20f90030aec69c
+ * body-sha256: 58265dc9d172b1249d901eed4416fda8360eadec5ace171e4b091900dc8a44c8
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -184,9 +184,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Iterations are slow if a correction exceeds this fraction of the one before. */
 const SHRINKING = 0.25;
 
-/** Accepted length of a step, relative to |x| + |h dx/dt|. */
+/** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of a step longer than PLAUSIBLE. */
+/** Largest relative energy change of an increment beyond PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

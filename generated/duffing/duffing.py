@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a37b76460064f2377bddc2c0dd76778c74e47efd78b463c5d2769609ee26108f
+# body-sha256: 0c488267416d376160f1a39b5523627e6f21fad906d34cd6677d56b207e2f714
 import numpy as np
 
 VERSION = "0.1.0"
@@ -214,8 +214,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
+PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: d029bb28ee5d8f827c7fba0731680f799ee1c1d12fb432df8fc0ae67c6716851
+ * body-sha256: c8af816da99593ff10587fd0c12fbe8ad20745997ae7aea963d60b8655d2ed2b
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -214,8 +214,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-#define guiding_centre_PLAUSIBLE 1.5 /* accepted length of a step, relative to |x| + |h dx/dt| */
-/* largest relative energy change of a step longer than PLAUSIBLE */
+#define guiding_centre_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
+/* largest relative energy change of an increment beyond PLAUSIBLE */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

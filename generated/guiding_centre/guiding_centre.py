@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dec8cdf9d4f506f56845b2ce5821954d8b28b31be19dfa9360990382c8aba649
+# body-sha256: 572b99406cfd8919ff28256c1b95150f1b4d65b1eeea814fb4007a8ab53599ea
 import numpy as np
 
 VERSION = "0.1.0"
@@ -469,8 +469,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
+PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):

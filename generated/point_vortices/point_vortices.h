@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9eb229b8ab9e2e2ce713ebd678bbb2f9b657821303a30ca7ef0b20149d07ed1a
+ * body-sha256: c47560ada8f6ad289d22bb3474dbd27a37134a00d63e339a8e9990805e4361e9
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -50,7 +50,7 @@ typedef struct {
     double *x[point_vortices_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[point_vortices_DIM]; /* copies of the fields, to restore them if a step fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    /* solution of a stage before and after a sweep (one iteration at all sites); parameters at sites */
+    /* two solutions of a stage, each with parameters at sites: before and after a sweep of all sites */
     double *y[2][point_vortices_ARRAYS];
     point_vortices_predictor predictor[point_vortices_STAGES]; /* predictor of each stage */
     size_t sweeps; /* number of sweeps of all stages since point_vortices_init */

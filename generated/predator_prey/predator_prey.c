@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: e097b2d0e86b555341251dedd252d87109f6dc43ccd1c2008e7896f930009dc7
+ * body-sha256: 15176598be89c47ce26f3157103c309fb857d60fe0ba6e4b35f8ca3c91d78621
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -202,8 +202,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5 /* accepted length of a step, relative to |x| + |h dx/dt| */
-/* largest relative energy change of a step longer than PLAUSIBLE */
+#define predator_prey_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
+/* largest relative energy change of an increment beyond PLAUSIBLE */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8e634df7cc2774361600376393357f04408405a7aa5c991c5b0d3a286fd3fc68
+# body-sha256: 1cd8dd80e5d01459002cf830ec67847dd9e8dec50fc8199e80484dfc19982d39
 import numpy as np
 
 VERSION = "0.1.0"
@@ -208,8 +208,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
+PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):

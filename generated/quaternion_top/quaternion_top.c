@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 31a445af7f0aa67e165fbb3b6f53630d32b0108d145ba097b5dea8919356aad7
+ * body-sha256: a8f12ce9359c5167afa2db0a298c6acec1cf7ea558d8df4d34ed30552e9e2c6d
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -379,8 +379,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-#define quaternion_top_PLAUSIBLE 1.5 /* accepted length of a step, relative to |x| + |h dx/dt| */
-/* largest relative energy change of a step longer than PLAUSIBLE */
+#define quaternion_top_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
+/* largest relative energy change of an increment beyond PLAUSIBLE */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

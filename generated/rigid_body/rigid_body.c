@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 416864f8e7319206d8dc51524c5c5052b837d4b237c458f51a923c4bd25cefdf
+ * body-sha256: ff808bd539f6619e8291f6d356d486418b50298e252ebb9f09563d97697b7ab2
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -633,8 +633,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5         /* accepted length of a step, relative to |x| + |h dx/dt| */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of a step longer than PLAUSIBLE */
+#define rigid_body_PLAUSIBLE 1.5         /* largest plausible increment, relative to |x| + |h dx/dt| */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of an increment beyond PLAUSIBLE */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

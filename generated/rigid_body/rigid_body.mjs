@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a72c813b04826df838443114686312b2224c69e47f764b20b557e42bfc16983a
+ * body-sha256: a6db7170c4669484d1e5bb3b181ec00f5bbcbab75a6523e79949735e6ddfc91d
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -463,9 +463,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Iterations are slow if a correction exceeds this fraction of the one before. */
 const SHRINKING = 0.25;
 
-/** Accepted length of a step, relative to |x| + |h dx/dt|. */
+/** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of a step longer than PLAUSIBLE. */
+/** Largest relative energy change of an increment beyond PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

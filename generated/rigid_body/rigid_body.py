@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 921916fef01447f573f8e7e140289c6f3742b94b69197c40d7fc9116eacac38d
+# body-sha256: fb49f114c4bf4250896d43d6c7e3de353930bd22c42281e792980bb3196d7977
 import numpy as np
 
 VERSION = "0.1.0"
@@ -460,8 +460,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
+PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):

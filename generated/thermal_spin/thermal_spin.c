@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 1b812265b8cf64c269b512de62eb7b7907192a41f5b569ce438ec4f108b9be05
+ * body-sha256: b26f063debe2e3db7e22b869d50dc82809a37cd69f3f5db12d0e87f1cdcf2b3c
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -256,8 +256,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5 /* accepted length of a step, relative to |x| + |h dx/dt| */
-/* largest relative energy change of a step longer than PLAUSIBLE */
+#define thermal_spin_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
+/* largest relative energy change of an increment beyond PLAUSIBLE */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

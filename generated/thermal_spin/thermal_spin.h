@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dd772ad3180d3c0989838ff17612dfed1ef4060261bc25b89c08c71bccd77a25
+ * body-sha256: 3b1a5d1bd2ddb8bf0d5895ffc0b4be0c71ec00c282155916de426b6047eab326
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -18,8 +18,8 @@ extern "C" {
 /* number of coefficients: functions of params and h, and of the noise */
 enum { thermal_spin_COEFFICIENTS = 13 };
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
-enum { thermal_spin_DRAWS = 3 };   /* number of increments of all sources in a step */
-enum { thermal_spin_PARTS = 1 };   /* number of increments of one source in a step */
+enum { thermal_spin_DRAWS = 3 };   /* number of increments of all sources of noise in a step */
+enum { thermal_spin_PARTS = 1 };   /* number of increments of one source of noise in a step */
 
 typedef struct {
     double B;            /* field along z */

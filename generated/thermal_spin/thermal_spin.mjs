@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8855e141effebf5c1a02c87846e23a9a27757ef4c8bba86775d563041305182
+ * body-sha256: 2650706337b3a7d3696a44d59e1e6ed682c1792416fa966a1dcd37c524b1a387
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -282,9 +282,9 @@ const NEARLY_SOLVED = 1e-8;
 /** Iterations are slow if a correction exceeds this fraction of the one before. */
 const SHRINKING = 0.25;
 
-/** Accepted length of a step, relative to |x| + |h dx/dt|. */
+/** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of a step longer than PLAUSIBLE. */
+/** Largest relative energy change of an increment beyond PLAUSIBLE. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c48a4eeaae6b42793600cff95e50259ecfef4f3f95a1440d02d1892e440adfc9
+# body-sha256: 6499420671cef4f07f618c62edd9496ffe19a52241af87ed0afdd3b772349779
 import numpy as np
 
 VERSION = "0.1.0"
@@ -302,8 +302,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of a step, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of a step longer than PLAUSIBLE
+PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
+MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
 
 
 def _plausible(stage, x, end):

@@ -98,7 +98,7 @@ class FlowFunctions:
             pair = (*self._flow(others[0][0], _row(K)), *self._flow(outer, _row(ir.plus(K, 1))))
             count, two = ir.Constant(len(schedule.begin)), ir.Constant(2)
             body.append(ir.Loop("stages", pair, "k", ir.Constant(1), count, step=two))
-        doc = "Corrector: the flows before the first step of a run or, if after is 1, those after the last step"
+        doc = "Corrector: the flows before the first step of a run; if `after` is 1, the flows after the last step"
         parameters = ("after", "coef", "x", "displacement", "start", *["tape"] * self.stores)
         return self.function("corrector", doc, parameters, tuple(body))
 
@@ -118,7 +118,7 @@ class FlowFunctions:
         if self.turns:
             note, zeros = "attitude increments, which are not needed here", ir.Listed((ir.Constant(0.0),))
             body.insert(0, ir.vectors(ir.Vector(ELEMENTS), ELEMENT, value=zeros, note=note))
-        doc = "Apply the flow of a part of H; slope receives the derivative of its increment by the state at the start"
+        doc = "Apply the flow of a part of H; `slope` receives the Jacobian of the increment at the start of the flow"
         return self.function("tangent_flow", doc, ("part", "coef", "x", "displacement", "start", "slope"), tuple(body))
 
 

@@ -310,8 +310,8 @@ class _LaneFunctions:
         over_orders = ir.Loop("stages", tuple(_over_lanes(between)), "j", ir.Constant(1), K)
         body = (*reads, sums, ir.Clear(SUM, None, None), over_orders, *_over_lanes(ends))
         share = [ir.real(SHARE, ir.Binary("/", ONE, ir.Cast(K, "real")))] * (SHARE.symbol in names_in(body))
-        doc = f"Coefficient k >= 1 of {purpose}: first convolutions over the orders between 0 and k, then all other"
-        return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
+        doc = f"Coefficient k >= 1 of {purpose}: first convolutions over orders between 0 and k, then all other terms"
+        return typed_function(name, doc, ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(
         self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, description: str

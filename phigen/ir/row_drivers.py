@@ -151,7 +151,7 @@ class RowDrivers:
         if not self.layout.single_row:
             low = ir.Select(away, low, LENGTH)
         ends = "seams" if sites.seams else "open ends"
-        yield ir.Comment(f"the sites from second to third - 1 are away from all {ends}")
+        yield ir.Comment(f"the sites i with second <= i < third are away from all {ends}")
         yield _indices((BEGIN, FROM), (STOP, TO), (LOW, low), (HIGH, high))
         below_low = ir.Select(ir.Binary("<", STOP, LOW), STOP, LOW)
         yield _indices((SECOND, ir.Select(ir.Binary(">", BEGIN, LOW), BEGIN, below_low)))

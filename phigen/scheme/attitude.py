@@ -165,7 +165,9 @@ def flow_attitude(
         values = staged([*increment, *_element_after_flow(system, group, turning, time)], coefficients)
         parts = tuple(values[: len(increment)]), tuple(values[len(increment) :])
         inputs = {"coef": coefficients.slots, "state": system.coordinates, "element": _carrier(group)}
-        purpose = f"the flow of {names[k - 1]}, and the group element of the step up to its end"
+        purpose = (
+            f"the flow of {names[k - 1]}, and the group element from the start of the step to the end of this flow"
+        )
         kernels.append(Kernel(f"turn{k}", purpose, inputs, (Output("increment", parts[0]), Output("turned", parts[1]))))
     rate = rate_kernel(system, group, gauge, [turning.left for turning in flow_rotations])
     exponential_kernel = _exponential(group) if rate and group.matrices else None

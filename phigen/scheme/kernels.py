@@ -188,7 +188,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
         ),
         Kernel(
             "substitute",
-            "the solution for a right-hand side, from the factors, and the matrix slope times the solution",
+            "compute the `solution` for the right-hand side `side`, and `product` = `slope` * `solution`",
             {"factor": tuple(e.value for e in factor_symbols.values), "slope": _entries("K", n), "side": side},
             (Output("solution", tuple(solution)), Output("product", tuple(product))),
         ),

@@ -138,8 +138,8 @@ class PlausibilityPolicy(Policy):
     another energy.
     """
 
-    plausible: float = number(1.5, "accepted length of a step, relative to |x| + |h dx/dt|")
-    max_energy_change: float = number(0.5, "largest relative energy change of a step longer than PLAUSIBLE")
+    plausible: float = number(1.5, "largest plausible increment, relative to |x| + |h dx/dt|")
+    max_energy_change: float = number(0.5, "largest relative energy change of an increment beyond PLAUSIBLE")
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class GaussAdjointPolicy(Policy):
     )
     adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "at changes below this, sweeps end at the second that exceeds ADJOINT_STALLED times the one before"
+        1e-12, "sweeps end after two changes below this that exceed ADJOINT_STALLED times the previous change"
     )
 
 

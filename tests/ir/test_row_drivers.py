@@ -75,7 +75,7 @@ def test_sites_near_open_ends_have_loops_of_their_own() -> None:
     expect(drivers.driver("sweep", "", ("coef",), [case]), """
         segments unit in first..end:
           recordtype row = piece_of(s, unit)
-          -- the sites from second to third - 1 are away from all open ends
+          -- the sites i with second <= i < third are away from all open ends
           index begin = row.from, stop = row.to, low = 1, high = (s.length - 1)
           index second = (begin if (begin > low) else (stop if (stop < low) else low))
           index third = (stop if (stop < high) else (second if (high < second) else high))

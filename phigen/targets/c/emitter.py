@@ -294,8 +294,8 @@ def _of_noise(noise: Noise) -> Sizes:
     names = ", ".join(noise.sources)
     return [
         ("SOURCES", len(noise.sources), f"sources of noise: {names}"),
-        ("DRAWS", noise.draws, "number of increments of all sources in a step"),
-        ("PARTS", noise.parts, "number of increments of one source in a step"),
+        ("DRAWS", noise.draws, "number of increments of all sources of noise in a step"),
+        ("PARTS", noise.parts, "number of increments of one source of noise in a step"),
     ]
 
 
@@ -305,8 +305,8 @@ def _of_attitude(attitude: Attitude) -> Sizes:
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     shown = f"entries of an attitude: a matrix with {rows} rows" if rows else "entries of an attitude: a quaternion"
     sizes = [("ATTITUDE_SIZE", rows**2 or 4, shown)]
-    position = " and a position" * bool(group.translation)
-    sizes.append(("ELEMENT", group.size, f"entries of a group element: of an attitude{position}"))
+    element = f"matrix with {rows} rows" if rows else "quaternion" + " and a position" * bool(group.translation)
+    sizes.append(("ELEMENT", group.size, f"entries of a group element, which is a {element}"))
     sizes += [("ROWS_OF_ATTITUDE", rows, "rows of an attitude matrix")] if rows else []
     covector = f"entries of a covector, then {SIZE_OF_COVECTOR}"
     sizes += [("COVECTOR", len(group.matrices) + 1, covector)] if attitude.exponential else []

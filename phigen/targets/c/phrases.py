@@ -239,7 +239,7 @@ UNUSED_PARAMETERS = Choice(
 )
 
 UNUSED_GROUP = Choice(
-    "If there is a gauge but no parameter, the reverse pass of a group of members does not use its argument group.",
+    "If there is a gauge but no parameter, the reverse pass of a group of members does not use its argument `group`.",
     ("GAUGE && !PARAMETERS && !MONITOR",),
     {"NO_GROUP(group)": ("(void)group;", "")},
 )
@@ -662,7 +662,8 @@ STAGE_PREDICTORS = Choice(
 )
 
 SWEEPS = Choice(
-    "Sweeps of a Gauss step iterate over all unknowns, or over some of them; then they read integrals of increments.",
+    "Some sweeps of a Gauss step iterate over part of the unknowns only, and read time integrals of these unknowns. All"
+    " other sweeps iterate over all unknowns.",
     ("REDUCED",),
     {
         "ITERATED_COUNT": ("PHI_ITERATED", "PHI_UNKNOWNS"),

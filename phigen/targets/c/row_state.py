@@ -60,7 +60,7 @@ LATTICE = (
     StateBlock(
         "placed_varied",
         "JACOBI && TANGENT",
-        ("double *placed_varied[PHI_DIM]; /* variations of the positions in placed */",),
+        ("double *placed_varied[PHI_DIM]; /* variations of the positions in `placed` */",),
         reset=(
             "for (int k = 0; k < PHI_BODY_AXES; ++k, memory += block) s->placed_varied[phi_body_axes[k][0]] = memory;",
         ),
@@ -98,7 +98,7 @@ LATTICE = (
     StateBlock(
         "carry",
         "!SERIES && COMPENSATED",
-        ("double *carry[2 * PHI_DIM]; /* compensation terms of the fields, then of before */",),
+        ("double *carry[2 * PHI_DIM]; /* compensation terms of the fields, then those of `before` */",),
         reset=("for (size_t k = 0; k < 2 * PHI_DIM; ++k, memory += block) s->carry[k] = memory;",),
     ),
     StateBlock(
@@ -107,7 +107,7 @@ LATTICE = (
         (
             "double level;             /* energy level e = -H(x0). With H = A + B, log(A + e) - log(-B) stays 0 */",
             "double *densities;        /* densities of a part of H at the sites */",
-            "double *clock;            /* physical times of x and of before, each with its compensation term */",
+            "double *clock;            /* physical times of `x` and of `before`, each with its compensation term */",
         ),
         reset=("s->densities = memory, memory += block;", "s->clock = memory, memory += block;"),
     ),
@@ -140,7 +140,8 @@ LATTICE = (
         "SERIES && ADJOINT",
         (
             "double *y[3][PHI_ARRAYS];"
-            " /* solution of a stage before and after a sweep, and in the reverse pass; parameters at sites */",
+            " /* three solutions of a stage, each with parameters at sites: before a sweep, after it, and in the"
+            " reverse pass */",
             "double *const *side; /* right-hand side while the equation of the cotangents is solved, else NULL */",
             "double *const *handed, *shares;"
             " /* contributions to cotangents of other sites; partial sums of row segments */",
@@ -153,7 +154,7 @@ LATTICE = (
         "SERIES && SLOPES && !ADJOINT",
         (
             "double *y[2][PHI_ARRAYS];"
-            " /* solution of a stage before and after a sweep (one iteration at all sites); parameters at sites */",
+            " /* two solutions of a stage, each with parameters at sites: before and after a sweep of all sites */",
         ),
     ),
     StateBlock(
@@ -161,7 +162,7 @@ LATTICE = (
         "SERIES && !SLOPES && !ADJOINT",
         (
             "double *y[3][PHI_ARRAYS];"
-            " /* solution of a stage before and after a sweep, and perturbed; with the parameters at sites */",
+            " /* three solutions of a stage, each with parameters at sites: before a sweep, after it, and perturbed */",
         ),
     ),
     StateBlock(
@@ -252,7 +253,8 @@ LATTICE = (
         "NOISE && BY_HAND",
         (
             "uint64_t first_plane, planes;"
-            " /* number of the first plane in the whole lattice, and its number of planes, or 0 */",
+            " /* index of this solver's first plane, and number of planes, in the whole lattice; 0 before"
+            " phi_set_planes */",
         ),
     ),
     StateBlock(
@@ -369,13 +371,13 @@ ROW = (
     StateBlock(
         "window",
         "SEAMS",
-        ("double window;                /* the seams of the present sweep, encoded as in kinds of phi_solver */",),
+        ("double window;                /* the seams of the present sweep, encoded as in `kinds` of phi_solver */",),
         reset=("row.window = 0.0;",),
     ),
     StateBlock(
         "near_seams",
         "SEAMS && !ONE_ROW",
-        ("int near_seams;               /* bits: the axes across the row along which it is near a seam */",),
+        ("int near_seams; /* bit a is 1 if the row is near the seam of axis a; the last axis has no bit */",),
     ),
     StateBlock(
         "colour",

@@ -97,7 +97,9 @@ def _path_constants(program: Program, step: Path) -> Sizes:
         sizes.append(("TANGENT_FIXED", max(1, len(varied.fixed)), "values that are constant along the path"))
     if step.back:
         back, n = step.back, program.dimension
-        sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path in the reverse pass, with cotangents"))
+        sizes.append(
+            ("BACK", 3 * n + len(back.used), "number of values on a path in the reverse pass: state and cotangents")
+        )
         sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of a path in the reverse pass"))
         sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along the path"))
     return sizes

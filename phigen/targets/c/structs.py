@@ -99,7 +99,7 @@ COTANGENT = (
         "after",
         "GAUSS",
         (
-            "int chained; /* 1 if after has values, else 0 */",
+            "int chained; /* 1 if `after` has values, else 0 */",
             "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* derivatives of L by unknowns of the next step */",
         ),
     ),
