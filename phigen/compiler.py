@@ -145,7 +145,7 @@ def compile_proved(
     for warning in doubts(examination):
         warnings.warn(str(warning), PhigenWarning, stacklevel=3)
     if examination.compilation is None:
-        raise examination.obstacle or AssertionError("an examination without compilation has an obstacle")
+        raise examination.obstacle or AssertionError("the examination has neither a compilation nor an obstacle")
     return examination.compilation
 
 

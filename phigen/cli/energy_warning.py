@@ -49,7 +49,7 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
     """Return the warning about an energy error, with a hint; "" if the error is finite and not large."""
     if not math.isfinite(error):
-        warning = "H is not a finite number on all of this run: do not trust these states"
+        warning = "H is not a finite number at some states of this run: do not trust the run"
         return f"{warning}\n  hint: the run begins where H is not defined, or reaches such a point"
     if unit.kind not in _SCALES or not error > LARGE_ENERGY_ERROR:
         return ""

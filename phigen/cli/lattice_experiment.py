@@ -120,7 +120,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
     assert start is not None
     if run.records_numbers and path.suffix.lower() == ".csv":
         message = f"the run {run.name} has record: without state, and {path} has no state to continue from"
-        raise click.UsageError(f"--extend: {message}; a .npz file would have the state")
+        raise click.UsageError(f"--extend: {message}; store the run in a .npz file, which contains the last state")
     try:
         earlier_run = _past_of(path, run, solver.interface, start.state.shape)
     except _UNREADABLE as error:

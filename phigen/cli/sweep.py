@@ -134,7 +134,7 @@ def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:
     from phigen.errors import Diagnostic, SpecError
 
     if not spec.sweeps:
-        hint = "add one under sweeps:, with over and keep; docs/sweeps.md has examples"
+        hint = "add a sweep under sweeps:, with the keys over: and keep:; docs/sweeps.md has examples"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no sweeps", hint=hint)])
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()))
     if sweep is None:

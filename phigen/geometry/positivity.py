@@ -38,8 +38,8 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
     if sign == NOT_NEGATIVE:
         return Statement(name, PROVED, "by its form, except where it is 0")
     if starts:
-        return Statement(name, CHECKED, f"at the starts of runs, {len(starts)}; a step fails where it is not positive")
-    return Statement(name, UNDECIDED, "the spec has no runs; a step fails where it is not positive")
+        return Statement(name, CHECKED, f"at the start of each run; a step fails where {name} does not hold")
+    return Statement(name, UNDECIDED, f"the spec has no runs; a step fails where {name} does not hold")
 
 
 def not_negative(

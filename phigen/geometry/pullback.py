@@ -52,7 +52,9 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
     statement = decide_zero("inverse", [(c, e - symbol(c)) for c, e in zip(coordinates, composed, strict=True)])
     if not statement.holds:
         detail = f"{statement.detail}; residual {statement.residual}"
-        raise SpecError([Diagnostic(f"pullback: inverse is not the inverse of map: {detail}")])
+        raise SpecError(
+            [Diagnostic(f"pullback: the functions of inverse: do not invert the functions of map: ({detail})")]
+        )
     columns = [derivatives(form.map, c) for c in coordinates]
     return Coordinates(form.map, backward, inverse_matrix([list(row) for row in zip(*columns, strict=True)]))
 

@@ -145,7 +145,7 @@ def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
     multiple of the period near the size.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
-    return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
+    return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would need no seam"
 
 
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:

@@ -36,7 +36,8 @@ from phigen.symbolic.symbols import BEGINS, CHOSEN, Symbol
 Covector = Mapping[str, Expression]
 
 _HINT = (
-    "for spins there is a flow if H is linear or quadratic in the spin, along an axis; scheme: series works for every H"
+    "damping of a spin has a flow if H is linear in the spin, or quadratic in one component of the spin; "
+    "scheme: series works for every H"
 )
 
 

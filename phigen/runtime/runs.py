@@ -76,7 +76,7 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
     if settings.every is not None:
         every = _number(settings.every, "every")
         if every <= 0:
-            raise ValueError(f"every must be positive, not {settings.every!r}")
+            raise ValueError(f"every = {settings.every!r} is not positive")
         run = replace(run, every=every, at=())
     if settings.at is not None:
         known_end = run.stop is None and (run.until is not None or spec.monitor is None)

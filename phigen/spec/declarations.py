@@ -118,7 +118,7 @@ class Declarations:
         indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
         domain = "a pair" if self.relation == "pairs" else "a bond"
-        messages = {n: (f"{n!r} does not say at which end of {domain}", f"write {n}[a] or {n}[b]") for n in local}
+        messages = {n: (f"{n!r} has two values, one at each end of {domain}", f"write {n}[a] or {n}[b]") for n in local}
         common_names = {n: e for n, e in names.items() if n not in local}
         common_names |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
         refused = self.refused | self._counters() | messages | ({} if dated else self._timeless())
@@ -139,7 +139,7 @@ class Declarations:
         scope = AllowedNames(
             {},
             {
-                c: (f"{c!r} does not say at which end of a bond", f"write {c}[a] or {c}[b]")
+                c: (f"{c!r} has two values, one at each end of a bond", f"write {c}[a] or {c}[b]")
                 for c in symbols_of_coordinates
             },
         )

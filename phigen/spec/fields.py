@@ -167,7 +167,7 @@ def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
                 RecordKey(
                     "of",
                     _structure("of", nested - 1),
-                    "the Poisson structure in the new coordinates, which map defines",
+                    "the Poisson structure in the new coordinates, which map: defines",
                     required=True,
                 ),
                 RecordKey(
@@ -179,7 +179,8 @@ def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
                 RecordKey(
                     "inverse",
                     FORMULAS,
-                    "each coordinate of the spec, as a function of the new ones; needed if phigen cannot invert map",
+                    "each coordinate of the spec, as a function of the new coordinates; needed if phigen cannot "
+                    "invert the functions of map:",
                 ),
             ),
         )
@@ -390,8 +391,8 @@ _BESIDE_RUNS = {
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
 } | {
     "tolerance": "solver: {tolerance: …} is a key of the whole spec: write it beside runs:, not in a run",
-    "reconstruct": "reconstruct: is a key of the whole spec: write it beside runs:. Attitudes start at 1, in "
-    "Python at attitude0=",
+    "reconstruct": "reconstruct: is a key of the whole spec: write it beside runs:. The attitude starts as the "
+    "identity; in Python, the argument attitude0= sets another start",
     "retry": "in Python, solver.integrate(…, retry=n) divides a step that fails into smaller steps",
     "time": "start: is the time at which a run starts, until: the time at which it ends",
 }
@@ -504,7 +505,8 @@ RUN = Record(
         RecordKey(
             "direction",
             OneOf(DIRECTIONS),
-            "the crossings of the section that count: the expression is rising, falling, or both",
+            "which crossings of the section are stored: those where the expression rises (rising), those where it "
+            "falls (falling), or all (both)",
             default="rising",
         ),
         RecordKey(
@@ -703,7 +705,7 @@ SPEC = Record(
         RecordKey(
             "structure",
             OneOf(STRUCTURES),
-            "for scheme: gauss: exact for steps that are Poisson maps, to truncation for steps that are not",
+            "for scheme: gauss: whether steps are Poisson maps (exact) or only up to truncation errors (to truncation)",
             default="exact",
         ),
         RecordKey(

@@ -424,7 +424,7 @@ class Parser:
         """
         name = token.text
         if not self.scope.piecewise:
-            hint = "H, brackets, Casimirs and what steps depend on need derivatives"
+            hint = "phigen needs derivatives of H, brackets, Casimirs and all other formulas on which steps depend"
             raise self.abandon(f"{name} is allowed in observables and stop only", token.index, hint)
         arguments = [self.nested(self.condition if name == "if" else self.sum, opening)]
         while self.accept(","):

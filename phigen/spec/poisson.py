@@ -329,7 +329,7 @@ def _pullback(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | N
     names = tuple(image)
     forward = [declared.formula(node, declared.scope()) for _, node in image.values()]
     inner_path = (*declared.within, "pullback", "of")
-    inner = declared.inside(inner_path, names, "this structure must use the coordinates that map defines, not")
+    inner = declared.inside(inner_path, names, "this structure must use the new coordinates of map:, not")
     form = poisson_form(inner_form, inner)
     backward = _inverse(raw["inverse"], declared, inner) if "inverse" in raw else None
     if form is None or None in forward:

@@ -60,7 +60,7 @@ def run(
     if interval is not None and interval <= 0:
         _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
     elif interval is not None and "stride" in raw:
-        _fail(name, "every", "every and stride exclude each other", declared, "give only one of them")
+        _fail(name, "every", "every: and stride: exclude each other", declared, "give only one of them")
     end = until if until is not None else start + step * steps if step and steps and not monitored else None
     row_times = _row_times(name, raw, start, end, step, declared)
     if "direction" in raw and "section" not in raw:
@@ -132,7 +132,7 @@ def _row_times(
     """
     nodes = raw.get("at") or ()
     if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):
-        _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give only one of them")
+        _fail(name, "at", f"at: and {conflicting_key}: exclude each other", declared, "give only one of them")
     times = []
     for node in nodes:
         time = declared.number(node, declared.numbers())

@@ -113,9 +113,12 @@ def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tupl
     averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
     if averages and run.is_timed and not sweep.frames:
         reason = f"sweeps average over whole steps, but the rows of the run {run.name} are at given times"
-        return f"{averages[0]}: {reason}", "give the run stride: in place of every: or at:, or the sweep frames:"
+        return (
+            f"{averages[0]}: {reason}",
+            "in the run, write stride: in place of every: or at:; or add frames: to the sweep",
+        )
     if averages and monitored and run.average.after is not None:
-        reason = "sweeps with a monitor do not know the physical times that average: after: needs"
+        reason = "the run has after:, a physical time, but sweeps with a monitor do not know physical times"
         return f"{averages[0]}: {reason}", "remove after: from the run"
     return None
 
@@ -224,5 +227,5 @@ def _expect_sense(
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
     if "energy_error" in sweep.keep and declared.time:
-        hint = "keep final, or frames: solver.hamiltonian(x, t) is the energy there"
+        hint = "store states by keep: [final] or by frames:; solver.hamiltonian(x, t) returns the energy of a state"
         _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared, hint)

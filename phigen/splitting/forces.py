@@ -30,8 +30,8 @@ from phigen.symbolic.readable import shortened
 Field = tuple[Expression, ...]
 
 _DAMPING_HINT = (
-    "damping of a spin has a flow if H is linear in the spin, or quadratic along an axis; "
-    "scheme: series applies to every H"
+    "damping of a spin has a flow if H is linear in the spin, or quadratic in one component of the spin; "
+    "scheme: series works for every H"
 )
 
 

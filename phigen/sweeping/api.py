@@ -191,11 +191,13 @@ def _sweep_of(
         raise ValueError("energy_error: H depends on the time, so energy is not conserved")
     drawn = [axis.name for axis in sweep.over if not axis.size]
     if drawn and not sweep.random and not any(axis.name == "seed" for axis in sweep.over):
-        raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
+        raise ValueError(
+            f"over: {drawn[0]} has no count; add 'count', or draw values by 'random': 10 or by 'seed': {{'count': 10}}"
+        )
     if sweep.random and len(drawn) < len(sweep.over):
         raise ValueError(
-            "over: with random, all values are drawn at random: give from and to without count, and no lists, "
-            "or remove random"
+            "over: 'random' draws all values, but an entry has a count or a list; give only 'from' and 'to', "
+            "or remove 'random'"
         )
     if sweep.file and (sweep.over or sweep.random):
         raise ValueError("over: a file holds all values; remove the other keys")

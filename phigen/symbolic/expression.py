@@ -192,7 +192,9 @@ def number(value: Number) -> Expression:
 def symbol(name: str) -> Expression:
     """Return the symbol of that name; two symbols are the same object if and only if their names are equal."""
     if type(name) is str and ":" in name:
-        raise ValueError(f"{name!r} is no name of a spec; phigen's own are of the type Symbol")
+        raise ValueError(
+            f"{name!r} is no name of a spec, since it contains ':'; names that phigen adds have the type Symbol"
+        )
     return _node("symbol", (), name)
 
 

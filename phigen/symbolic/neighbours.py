@@ -70,7 +70,7 @@ class Neighbours:
         for part in match["index"].split(","):
             step = _STEP.fullmatch(part)
             if step is None or step["axis"] not in offsets:
-                raise KeyError(f"{symbol_name!r} is at no offset of the axes {', '.join(self.axes)}")
+                raise KeyError(f"{symbol_name!r}: {part} is not an axis ({', '.join(self.axes)}) plus a whole number")
             offsets[step["axis"]] = int(step["step"])
         return base, tuple(offsets.values())
 

@@ -79,8 +79,9 @@ def agreed(
         size = size_of(second_states)
         apart = np.max(np.abs(states - second_states), axis=1) > AGREED * accuracy * size
         raise CheckError(
-            f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
-            f"small steps agree to that only up to {clock} = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
+            f"no reference solution for the orbit: to measure an error of {accuracy:.1e}, two methods with small "
+            f"steps must agree, but at {clock} = {spacing * int(np.argmax(apart)):.4g} of {span:.6g} the two solutions "
+            "already differ too much\n"
             "  hint: the motion is chaotic, or the error is at rounding level; ask for a shorter --horizon or less "
             "accuracy, or let --measure be energy"
         )

@@ -70,7 +70,7 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
 def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours_or_no_seam(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1], 9), encoding="utf-8")
-    said = "Splitting: 2 colours and a seam, since 9 along i is not a multiple of 2; 8 would do without\n"
+    said = "Splitting: 2 colours and a seam, since 9 along i is not a multiple of 2; 8 would need no seam\n"
     assert said in phigen("check", spec).stdout
     periodic = ring([1], 9).replace("axes: [i]", "axes: [i, j], boundary: [periodic, open]").replace("[9]", "[9, 2]")
     spec.write_text(periodic, encoding="utf-8")
@@ -327,4 +327,4 @@ def test_an_energy_that_is_no_number_is_reported(phigen, tmp_path):
         encoding="utf-8",
     )
     result = phigen("run", path, "-t", "numpy")
-    assert "warning: H is not a finite number on all of this run: do not trust these states" in result.stderr
+    assert "warning: H is not a finite number at some states of this run: do not trust the run" in result.stderr

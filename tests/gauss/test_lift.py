@@ -167,7 +167,7 @@ def test_casimirs_do_not_drift(name):
 
 
 def test_check_proves_that_frames_make_the_step(monkeypatch):
-    name = "U = FG makes the step of G, where x̃(q) = k̃(FqF*)"
+    name = "U = FG gives the same step as G, where x̃(q) = k̃(FqF*)"
     for checked in ("rigid_body", "so4_manakov"):
         spec = replace(spec_of(checked), scheme="gauss", composition="auto", reconstruct="")
         assert next(s for s in examine(spec).statements if s.name == name).verdict == "proved"

@@ -116,7 +116,7 @@ def test_steps_are_those_of_group_elements(target, monkeypatch):
 
 
 def test_check_proves_that_functionals_make_the_step(monkeypatch):
-    name = "g and λ(b) = x̃(gb) + 2x̃(nb) make the step of G = g + n"
+    name = "g and λ(b) = x̃(gb) + 2x̃(nb) give the same step as G = g + n"
     spec = loads(f"phigen: 1\nname: t\n{TOP}")
     for checked in (spec_of("kowalevski_gauss"), spec):
         assert next(s for s in examine(checked).statements if s.name == name).verdict == "proved"

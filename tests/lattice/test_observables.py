@@ -257,10 +257,10 @@ def test_observables_go_to_files_sessions_and_xarray(tmp_path):
         (FILM, "{mean: z}", '{mean: "z[k+1]"}', "'k'"),
         (FILM, "{mean: z}", "{mean: z, over: bonds}", "over: bonds needs lattice: {graph: NAME}"),
         (FILM, "M: {mean: z}", "C: {mean: z}", "observables: 'C' is the name of a Casimir"),
-        (WEB, "{max: p**2}", "{max: p**2, over: bonds}", "'p' does not say at which end of a bond"),
+        (WEB, "{max: p**2}", "{max: p**2, over: bonds}", "'p' has two values, one at each end of a bond"),
         (WEB, "{sum: p}", "{sum: p, over: pairs}", "over: pairs needs lattice: {pairs: all}"),
         (WEB, "{sum: p}", '{sum: "p[a]"}', "p[…]"),
-        (WEB, '{sum: "q[a]*p[b]**2", over: bonds}', "{sum: q*p, over: bonds}", "'q' does not say at which end"),
+        (WEB, '{sum: "q[a]*p[b]**2", over: bonds}', "{sum: q*p, over: bonds}", "'q' has two values, one at each end"),
         (FILM, "sizes: [4, 5]", "sizes: [2, 5]", "sizes: 2 along i is too small"),
     ],
 )

@@ -129,7 +129,7 @@ def test_arguments_take_the_place_of_settings():
         ({"at": [0.25]}, "before the start"),
         ({"at": [1e3]}, "after the end"),
         ({"x0": [0.3, 0.2], "q": 0.1}, "either x0 or initial values"),
-        ({"every": 0.0}, "every must be positive"),
+        ({"every": 0.0}, "every = 0.0 is not positive"),
         ({"every": float("nan")}, "every must be a finite number"),
         ({"steps": 0}, "steps must be at least 1"),
         ({"B": 1.0}, "unknown parameter 'B'"),

@@ -363,7 +363,7 @@ def test_references_that_disagree_are_no_reference():
     reference = agreed(Drifting(), Drifting(rate=1e-12), 0.1, 100.0, 1e-8, 1.0)
     assert reference.uncertainty == pytest.approx(1e-10)
     assert reference(0.5, MARKS).shape == (MARKS + 1, 2)
-    with pytest.raises(CheckError, match=r"agree to that only up to t = 20"):
+    with pytest.raises(CheckError, match=r"must agree, but at t = 20[^ ]* of 100 the two"):
         agreed(Drifting(), Drifting(rate=1e-10), 0.1, 100.0, 1e-8, 1.0)
 
 
