@@ -163,7 +163,7 @@ def _functionals(system: System, points: StageMap) -> Statement:
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)
     residuals = _differences(system, points, complete, values, {})
-    return decide_zero("g and λ(b) = x̃(gb) + 2x̃(nb) make the step of G = g + n", residuals, system.positive)
+    return decide_zero("g and λ(b) = x̃(gb) + 2x̃(nb) give the same step as G = g + n", residuals, system.positive)
 
 
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
@@ -182,7 +182,7 @@ def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
     at_start = {name: e for name, e in at_unknowns(lifted).items() if name in names}
     states = dict(zip(at_start, substitute([*at_start.values()], dict.fromkeys(lifted.unknowns, ZERO)), strict=True))
     residuals = _differences(system, lifted, points, values, states)
-    return decide_zero("U = FG makes the step of G, where x̃(q) = k̃(FqF*)", residuals, system.positive)
+    return decide_zero("U = FG gives the same step as G, where x̃(q) = k̃(FqF*)", residuals, system.positive)
 
 
 def _differences(
@@ -238,7 +238,7 @@ def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> I
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
-    yield decide_zero("the unknowns 0 belong to the state at the start of a step", start, system.positive)
+    yield decide_zero("a stage whose unknowns are 0 has the state at the start of the step", start, system.positive)
     slopes = substitute(vector_field(points, at_unknowns(points)), at_start)
     columns = sparse_derivatives(points.change, points.unknowns)
     rates = [

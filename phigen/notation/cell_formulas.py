@@ -59,7 +59,7 @@ def sections(cell: Cell, max_terms: int | None = SHOWN) -> list[tuple[str, list[
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
         ("Hamiltonian, the sum of", _densities(cell)),
-        ("Forces at a site: ẋ = π(∇H + ζ) + f, and with damping λ: ζ + λ π∇H for ζ", _forces(cell)),
+        ("Forces at a site: ẋ = π(∇H + ζ) + f; damping adds λ π∇H to ζ", _forces(cell)),
         ("Noise at a site: dx = … + Σ σ π∇g ∘ dW", _noise(cell)),
         ("Casimirs", [(KINDS[kind] + name, density) for name, (density, kind) in cell.casimirs.items()]),
         ("Invariants, sums of", list(cell.invariants.items())),

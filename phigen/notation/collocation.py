@@ -41,7 +41,11 @@ def lines(compilation: CompiledGauss) -> list[str]:
             continue
         shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
         description = unknowns if all(s.is_zero for s in part.shift) else ", ".join(shifts)
-        in_ideal = f", by {part.unknowns} unknowns: functionals replace its part in an ideal" if part.ideal else ""
+        in_ideal = (
+            f"; {part.unknowns} unknowns, since functionals replace the components of G in an ideal"
+            if part.ideal
+            else ""
+        )
         listed_lines.append(
             f"{description}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
             + in_ideal

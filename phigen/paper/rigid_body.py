@@ -145,7 +145,7 @@ def section_plate() -> Plate:
     course.advance(COARSE, _REST)
     end_state, orbit = course.state(), body.solver.integrate(body.x0, body.h, 700)
     findings = (
-        Finding("PHI-2, step 0.004: diameter of its crossings", "one point", _diameter(poisson_crossings)),
+        Finding("PHI-2, step 0.004: diameter of the set of crossings", "one point", _diameter(poisson_crossings)),
         Finding("RK4, step 0.004: distance of its last crossing from the first", "moves away",
                 float(np.linalg.norm(runge_kutta_points[-1] - runge_kutta_points[0]))),
         Finding("RK4, step 0.004: |x| in the end", "0", float(np.linalg.norm(end_state))),

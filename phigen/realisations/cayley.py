@@ -86,7 +86,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         increment,
         True,  # symmetric: β(x, p) = α(x, −p)
         explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
-        reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
+        reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), where each 4 must be 2",
     )
 
 

@@ -30,10 +30,10 @@ ORDERS, MOST = (2, 4), 200_000
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
-HELP = """Drag a three-dimensional picture, or use the arrow keys, to turn both; + and − zoom; 0 resets the view.
-Between steps the curves are interpolated. The panel chooses the {} at its start: at equal work, the errors of RK4
-should become visibly larger than those of phigen within ten seconds, and phigen should also work with twice the step.
-With smaller steps both methods come closer to the exact solution, and over short times RK4 is often closer."""
+HELP = """To turn both three-dimensional pictures, drag one of the two, or use the arrow keys; + and − zoom; 0 resets
+the view. Between steps the curves are interpolated. The panel chooses the {} at its start: at equal work, the errors of
+RK4 should become visibly larger than those of phigen within ten seconds, and phigen should also work with twice the
+step. With smaller steps both methods come closer to the exact solution, and over short times RK4 is often closer."""
 
 NOISE = "it would compare the solver with RK4, which does not apply to systems with noise"
 NOTHING = "Nothing is conserved, because this system depends on the time or has forces: no errors are shown."

@@ -459,8 +459,8 @@ class _SmallLattice:
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
     """Return the lattice with parameters for which π is finite, and a note.
 
-    If a parameter is 0 and therefore makes π infinite, its value is replaced. The note, such as ", m = 0.1 for 0", is
-    added to the name of a check; it is "" if nothing was replaced.
+    If a parameter is 0 and therefore makes π infinite, its value is replaced. The note is added to the name of a check,
+    such as ", m = 0.1 instead of 0". The note is "" if nothing was replaced.
     """
     with np.errstate(all="ignore"):
         if np.isfinite(_poisson(small_lattice.whole, small_lattice.x, small_lattice.parameters)).all():
@@ -471,7 +471,7 @@ def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_Sm
         if not values.all():
             least = float(np.abs(values[values != 0]).min(initial=1.0))
             replaced[name] = np.where(values == 0, least, values)
-    note = "".join(f", {name} = {np.abs(values).min():.3g} for 0" for name, values in replaced.items())
+    note = "".join(f", {name} = {np.abs(values).min():.3g} instead of 0" for name, values in replaced.items())
     return replace(small_lattice, parameters={**small_lattice.parameters, **replaced}), note
 
 
