@@ -61,8 +61,8 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
     """Return the element with the quaternion (1 − sφ, p/2), where s = |p|² and φ has any value.
 
-    The element is not yet divided by lengths. φ = 0 gives the Cayley transform. In the result, ``length`` is the square
-    of the length of the quaternion.
+    φ = 0 gives the Cayley transform. The quaternion and the translation are not yet normalised. The field ``length`` of
+    the result is the square of the length of the quaternion.
     """
     s = dot(p, p)
     c = ONE - s * phi

@@ -70,7 +70,9 @@ class Turning:
 
     @property
     def left(self) -> Expression:
-        """The multiple of a Casimir whose flow rotates the attitude once in a step; 0 unless ``put_back`` is set."""
+        """The summand ``casimir`` if ``put_back`` is set, else 0. The rotation by this summand is applied once in a
+        step.
+        """
         return self.casimir if self.put_back else ZERO
 
 
@@ -131,7 +133,8 @@ def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: b
 
 
 def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
-    """Return the part of a flow as a sum of functions whose flows have known group elements.
+    """Return the part of H that generates ``flow``, as a sum of functions whose flows have known group
+    elements.
 
     In messages, ``name`` stands for the part.
     """

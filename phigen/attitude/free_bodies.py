@@ -89,7 +89,8 @@ def _matrix(group: Group, q: Vector) -> list[Expression]:
 class _SortedAxes:
     """The momentum ``x`` and the inverse moments ``weights`` of a rigid body.
 
-    Their components are in the order l, m, h of the text of this module. ``square`` is L² = |x|², ``inverse`` is 1/L².
+    The components are in the order l, m, h of the axes, which is defined at the head of the file. ``square`` is L² =
+    |x|², ``inverse`` is 1/L².
     """
 
     x: Vector
@@ -123,11 +124,11 @@ class _SortedAxes:
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the coordinates of the point with the polar angle χ at the head of the file. The second one is divided
-        by L.
+        """Return the coordinates of the point whose polar angle is χ. The second coordinate is divided by L.
 
-        ``q``, ``s``, ``c`` and ``d`` are Q, S, C and D; ``square`` is T², and ``unit`` is 1. To avoid a division,
-        ``unit`` and ``square`` may be multiplied by the same number, which does not change χ.
+        The point is defined at the head of the file. ``q``, ``s``, ``c`` and ``d`` are Q, S, C and D; ``square`` is T²,
+        and ``unit`` is 1. To avoid a division, ``unit`` and ``square`` may be multiplied by the same number, which does
+        not change χ.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse
@@ -140,8 +141,8 @@ def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression. If all expressions are 0, the formulas at the head of the file are
     correct.
 
-    The formulas contain the momentum x' after the flow; `phigen.splitting.euler` proves the formula for x'. The time
-    derivative of S is written as CD.
+    The expressions contain the formula for the momentum x' after the flow, which `phigen.splitting.euler` proves. They
+    contain CD as the time derivative of S (see `phigen.symbolic.elliptic`).
     """
     yield from _shortest_rotation()
     for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of one of these
@@ -151,8 +152,8 @@ def identities() -> Iterator[tuple[str, Expression]]:
 def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the shortest rotation that takes x' to x.
 
-    M is this rotation as a quaternion of any length. All expressions vanish if M x' = x and if, up to the length of M,
-    Ṁ = M(ω − θ̇x')/2 for any angular velocity ω, with the θ̇ of this module.
+    Let the quaternion M, of any length, be this rotation, and ω any angular velocity. If all expressions are 0, two
+    equations hold: M x' = x and, up to the length of M, Ṁ = M(ω − θ̇x')/2. The head of the file has the formula for θ̇.
     """
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]
@@ -169,10 +170,10 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield a label and an expression that is 0 if the formulas of this module for θ and θ̇ agree.
+    """Yield a label and an expression. If the expression is 0, the formula for θ̇ is the time derivative of the formula
+    for θ.
 
-    The expression vanishes if the formula for θ̇ is the time derivative of the formula for θ. ``order`` has the indices
-    of the axes l, m, h with the smallest, the middle and the largest E_i.
+    Both formulas are at the head of the file. ``order`` has the indices of the axes l, m and h.
     """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")

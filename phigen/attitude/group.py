@@ -33,8 +33,9 @@ Dense = tuple[tuple[Expression, ...], ...]
 class Group:
     """The group of an attitude, and its Lie algebra with ``dimension`` components.
 
-    ``spatial`` says that x are momenta in space, so that the elements of steps are multiplied from the left. If
-    attitudes are matrices, ``matrices`` has the generator of each component. Otherwise they are quaternions:
+    If ``spatial`` is true, x are momenta in space, and a step multiplies the attitude by the group element of the step
+    from the left. Otherwise x are momenta in the body, and the step multiplies from the right. If attitudes are
+    matrices, ``matrices`` has the matrix of each basis element of the algebra. Otherwise attitudes are quaternions:
     ``rotation`` has the indices of the components that form so(3), and ``vectors`` the indices of each vector that
     so(3) rotates.
     """
@@ -161,7 +162,10 @@ def _by_position(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[i
 
 
 def _vectors(algebra: LieAlgebra, rotation: Triple, sign: int) -> tuple[Triple, ...]:
-    """Return the triples of indices that transform as vectors under the components ``rotation``, which form so(3)."""
+    """Return the triples of basis elements that rotations transform as vectors.
+
+    A triple consists of the indices of three basis elements. ``rotation`` is the triple that spans so(3).
+    """
     left = [i for i in range(algebra.dimension) if i not in rotation]
     vectors: list[Triple] = []
     for a, b, c in permutations(left, 3):
@@ -186,7 +190,8 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """Return the group of matrices that represent the algebra. The sign of the generators is explained at `_signed`.
+    """Return the group of matrices that represent the algebra. The sign of the matrices is explained at
+    `_signed`.
 
     Raises `SpecError` if no faithful matrices are known that suit the ``kind`` of the bi-realisation.
     """
@@ -218,9 +223,9 @@ def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
 
 
 def _signed(e: Expression, spatial: bool) -> Expression:
-    """Return an entry of a generator with the sign of the convention for momenta in the body or in space.
+    """Return the entry ``e`` of the matrix of a basis element, with the sign for momenta in space or in the
+    body.
 
-    The known matrices represent the bracket for momenta in space, where elements are multiplied from the left. For
-    momenta in the body, the negatives of these matrices represent the bracket.
+    The sign is + for momenta in space and − for momenta in the body, so that the matrices represent the bracket.
     """
     return e if spatial else -ONE * e
