@@ -39,9 +39,7 @@ class NumberTable:
     rows: Floats
 
     def line(self, row: int) -> str:
-        """Return the text "line N" for messages, where N is the number of the line that contains row ``row`` of the
-        numbers.
-        """
+        """Return the text "line N" for messages. Line N of the file has the numbers of row ``row``."""
         with opened_text(self.path) as stream:
             line_numbers = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
         return f"line {line_numbers[row + bool(self.names)]}"

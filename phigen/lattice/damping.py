@@ -64,7 +64,7 @@ class _NoFlowError(Exception):
 
 
 class _TogetherError(_NoFlowError):
-    """The damping has no elementary flow with the colouring that was tried; another colouring may have one."""
+    """Two neighbours have the same colour. With another colouring, the damping may have an elementary flow."""
 
 
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
@@ -118,7 +118,7 @@ def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[i
     """Return the colours that are damped one after the other.
 
     There is one entry if the damping of a site does not depend on its neighbours. There is one entry for a graph as
-    well, since its colours are known only at run time. Raises `_TogetherError` if neighbours have one colour.
+    well, since its colours are known only at run time. Raises `_TogetherError` if two neighbours have the same colour.
     """
     if cell.relation == GRAPH:
         return [0]

@@ -126,21 +126,21 @@ def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | 
     return np.asarray(integrals[whole_intervals] + h * _interval_integrals(values, count, whole_intervals, part))
 
 
-def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
+def _interval_integrals(values: Floats, count: int, first_points: NDArray[np.int64], lengths: Floats) -> Floats:
     """Return the integral of a function over each of several intervals.
 
-    ``values`` has the function at equidistant points. On each interval, the polynomial through the ``count`` nearest
-    points is integrated. An interval begins at the point whose index is in ``stencil_starts``. ``lengths`` has the
-    lengths of the intervals, in units of the distance between two points.
+    ``values`` has the function at equidistant points. Interval k begins at the point with the index
+    ``first_points[k]``. The length of the interval is ``lengths[k]`` times the distance between two points. On each
+    interval, the polynomial through the ``count`` nearest points is integrated.
     """
     count = min(count, len(values))
-    starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)
+    starts = np.clip(first_points - (count // 2 - 1), 0, len(values) - count)
     powers = np.arange(count)
     vandermonde = np.arange(count)[None, :] ** powers[:, None]
-    integrals = np.zeros(len(stencil_starts))
-    for position, length in {*zip((stencil_starts - starts).tolist(), lengths.tolist(), strict=True)}:
+    integrals = np.zeros(len(first_points))
+    for position, length in {*zip((first_points - starts).tolist(), lengths.tolist(), strict=True)}:
         moments = ((position + length) ** (powers + 1) - float(position) ** (powers + 1)) / (powers + 1)
         weights = np.linalg.solve(vandermonde.astype(np.float64), moments)
-        selected = np.flatnonzero((stencil_starts - starts == position) & (lengths == length))
+        selected = np.flatnonzero((first_points - starts == position) & (lengths == length))
         integrals[selected] = sum(w * values[starts[selected] + k] for k, w in enumerate(weights))
     return integrals

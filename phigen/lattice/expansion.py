@@ -45,7 +45,7 @@ class Expansion:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """The coordinates of the ordinary spec, by field, then by site."""
+        """The coordinates of the expansion, by field, then by site."""
         return tuple(self.names[f, s] for f in self.cell.fields for s in self.sites)
 
     # --- expressions at sites
@@ -190,8 +190,9 @@ class Expansion:
         return MatrixForm(tuple(tuple(entries.get((a, b), ZERO) for b in self.coordinates) for a in self.coordinates))
 
     def spec(self) -> Spec:
-        """Return the ordinary spec. Each parameter with a value at every site or bond becomes one parameter for each
-        site or bond.
+        """Return the expansion as a spec, which has no key ``lattice``.
+
+        Each parameter with a value at every site or bond becomes one parameter for each site or bond.
         """
         cell = self.cell
         parameters: list[Parameter] = []

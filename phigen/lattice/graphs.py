@@ -40,7 +40,8 @@ ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
 #: Classes of terms in a part: terms at all sites and bonds; terms at bonds that begin at sites of one colour; terms at
 #: bonds that end at sites of one colour.
 WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
-#: For each class of terms: the end of a bond at which the site has the colour of the part.
+#: For each class of terms, one end of a bond, a or b. A part contains the terms of a bond if the site at this end has
+#: the colour of the part.
 _CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
 
 _OTHER = {"a": "b", "b": "a"}
@@ -303,11 +304,10 @@ def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expre
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:
-    """Yield the terms of a rate of change, each as a pair: a monomial in the fields of this site, and its
-    coefficient.
+    """Yield the terms of ``rate``, the rate of change that a bond causes at one of its ends.
 
-    In the rate, a field of this site is written ``x[a]``; in the monomial, it is written ``x``. The coefficient may
-    depend on the opposite end of the bond.
+    Each term is a pair: a monomial in the fields at this end, and its coefficient. In ``rate``, a field x at this end
+    is written ``x[a]``; in the monomial, it is written ``x``. The coefficient may depend on fields at the opposite end.
     """
     ring = bracketless_ring([cell.at(f, ("a",)) for f in cell.fields], [rate])
     site_symbols = {cell.at(f, ("a",)): symbol(f) for f in cell.fields}

@@ -250,7 +250,11 @@ def _offset(site: Site, base: Site, names: _SiteNames) -> Site:
 
 
 def _key(e: Expression, names: _SiteNames) -> float:
-    """Return the value of a term at a fixed point, rounded to 9 digits. Terms with equal values count as equal."""
+    """Return the value of a term at a sample point, rounded to 9 digits. Terms with equal values count as
+    equal.
+
+    The sample point is the same for all terms.
+    """
     for name in symbols_of(e):
         # Fractional parts of multiples of the golden ratio are all different, and spread evenly. 0.5 is added to avoid
         # 0.
@@ -422,6 +426,7 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     site_arrays = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRunSettings(names.sizes, state, (), site_arrays)
-    # Sections and stops of an ordinary spec are left out: in the spec of a lattice they would have to name observables.
+    # The keys ``exact``, ``section`` and ``stop`` of a run are not copied. In the spec of a lattice, sections and stops
+    # must name observables.
     none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

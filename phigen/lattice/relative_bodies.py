@@ -54,8 +54,8 @@ class _OtherFormError(Exception):
 
 @dataclass(frozen=True)
 class LatticeBodies:
-    """Attracting bodies at the sites of a cell, in relative coordinates. ``change`` is the name of the coordinates:
-    "jacobi" or "democratic_heliocentric".
+    """Attracting bodies, one at each site of a lattice, in relative coordinates. ``change`` is the name of the
+    coordinates: "jacobi" or "democratic_heliocentric".
 
     ``axes`` pairs each position with its momentum if ``momenta`` is true, else with its velocity. ``mass`` is the name
     of the parameter at sites, and ``gravity`` is the constant γ in the energies −γ m_i m_j/|q_i − q_j|.
@@ -120,7 +120,7 @@ class LatticeBodies:
         """Return the flow of the remainder B = H − A, where A is the Hamiltonian of the Kepler motions.
 
         The attribute ``hamiltonian`` of the flow is the energy of attraction between two bodies. In Jacobi coordinates,
-        the energy of attraction in the Kepler motion of a body is subtracted from this energy.
+        γ M_i m_i/|Q_i| is added, for the Kepler motion of body i.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]

@@ -176,7 +176,10 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the sums over other bodies that the flow of the remainder of H needs at body ``i``, by symbol."""
+        """Return the sums over bodies in the equations of motion of body ``i`` with the Hamiltonian B = H − A.
+
+        The result maps the symbol of each sum to its expression.
+        """
         axes, first = range(len(self.bodies.axes)), 0 if self.bodies.jacobi else 1
 
         def pulled(a: int, k: int) -> Expression:

@@ -187,7 +187,7 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return formulas by field in which the covectors p at all sites are replaced by expressions.
+    """Return the formulas ``maps``, by field, with expressions in place of the covectors p at all sites.
 
     ``maps`` has formulas with symbols for p, for instance the formula for the increment of x in a stage. The
     expressions that replace p are p = h(∇H + ζ) + Σ ΔW σ∇g, with the covector force ζ. The sum is over the sources of

@@ -190,14 +190,14 @@ def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotio
 
 @dataclass(frozen=True)
 class CellFlow(Flow):
-    """The flow of a part of H over the lattice. The order of the ``motions`` has no effect, nor has the order of the
-    sites.
+    """The flow of a part of H over the lattice.
 
-    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On a graph,
-    ``by_colour`` is true if the part has only the terms of one colour; a step then applies the flow once for each
-    colour. If the colouring has boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set
-    of seams, as a bit mask over the axes (see `Colouring.windows`): ``beside`` is the motion under the terms that begin
-    on exactly these seams.
+    ``motions`` has the solved equations of motion of sites. The order of these equations has no effect, nor has the
+    order of the sites. ``summands`` are the terms of the part, each with the colours of the sites where it begins. On a
+    graph, ``by_colour`` is true if the part has only the terms of one colour; a step then applies the flow once for
+    each colour. If the colouring has boundary seams, ``beside`` has the solved equations of motion of a site near the
+    seams. The equations in ``beside`` contain the terms that begin on exactly the seams in ``window``, a bit mask over
+    the axes (see `Colouring.windows`).
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -208,13 +208,13 @@ class CellFlow(Flow):
 
     @property
     def every_motion(self) -> tuple[SiteMotion, ...]:
-        """The motions of sites away from seams, followed by the motion near seams if there is one."""
+        """The entries of ``motions``, followed by ``beside`` if it is not None."""
         return (*self.motions, *([self.beside] if self.beside else []))
 
 
 @dataclass(frozen=True)
 class CellSplitting:
-    """The flows of the parts of H, and the ``colouring`` of sites with which the parts were found."""
+    """The flows of the parts of H, and the ``colouring`` of the sites. The parts depend on the colouring."""
 
     flows: tuple[CellFlow, ...]
     colouring: Colouring
@@ -388,8 +388,8 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near boundary seams. A seam is at the last sites along an axis, where the colours
-        do not repeat.
+        """Return the solved equations of motion of a site near boundary seams. A seam is at the last sites along an
+        axis, where the colours do not repeat.
 
         Returns None if there are no seams, or if the part has the terms of all colours, so that seams make no
         difference.
@@ -440,10 +440,10 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of the sites of a ``colour`` under the terms of a part of H, or of the sites near seams if
-        ``colour`` is None.
+        """Return the solved equations of motion of a site under the terms of a part of H.
 
-        ``more`` has the terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
+        The site has the colour ``colour``. If ``colour`` is None, the site is near boundary seams. ``more`` has the
+        terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
         """
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
@@ -481,8 +481,9 @@ class PartSearch:
         colour: int | None,
         part: Sequence[tuple[Summand, int]],
     ) -> SiteMotion:
-        """Return the motion of a site with the equation ẋ = ``rates``, in which symbols stand for the values in
-        ``forces``.
+        """Return the equations of motion ẋ = ``rates`` of a site, with their solution.
+
+        Symbols in ``rates`` stand for the expressions in ``forces``.
         """
         if not rates:
             return SiteMotion(colour, {})

@@ -219,7 +219,7 @@ class _Arrays:
         return array
 
     def refused(self, name: str, message: str) -> SpecError:
-        """Return an error that points to the place of the values in the spec.
+        """Return an error that points to the place in the spec where the values of ``name`` are given.
 
         ``name`` is a field or a parameter, or "initial" for the whole state.
         """

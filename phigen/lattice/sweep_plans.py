@@ -97,7 +97,7 @@ class SplittingPlan:
 
     @property
     def colouring(self) -> Colouring:
-        """The colouring of the sites with which the parts were found."""
+        """The colouring of the sites. The parts of H depend on this colouring."""
         return self.parts.colouring
 
     @property
@@ -249,9 +249,10 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield the flows of the terms of a part of H that begin on boundary seams.
+    """For each set of boundary seams, yield the flow of the terms that begin on exactly these seams.
 
-    There is one flow for each set of seams on which a site may lie.
+    ``flow`` is the flow of a part, with the terms that begin on no seam. Nothing is yielded if no term of the part
+    begins on a seam.
     """
     colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):
