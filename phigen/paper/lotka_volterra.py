@@ -129,7 +129,10 @@ def _draw_errors(course: Approach) -> Figure:
 
 
 def singularity_plate() -> Plate:
-    """Return the figure of the methods at the singularity, with steps large enough to be visible."""
+    """Return the figure of PHI-1 and RK2 near T_sing, the time at which the exact solution becomes infinite.
+
+    The steps are so large that they are visible in the figure.
+    """
     course = approach()
     x0, steps = [float(v) for v in course.run.initial], round(END / COARSE)
     orbit, stopped = _until_it_fails(course.solver, x0, COARSE, steps)

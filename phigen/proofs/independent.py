@@ -59,7 +59,7 @@ class Agreement:
 
     @property
     def timed(self) -> Statement:
-        """The statement; its ``detail`` also has the seconds that both derivations took."""
+        """The statement. Its ``detail`` also says how many seconds sympy and phigen took."""
         seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
             terms = "" if self.term == 1 else f"S_1 … S_{self.term} "
@@ -204,8 +204,11 @@ class _Derivation:
         return Agreement(statement, i, self._taken, end - middle)
 
     def _gradient(self) -> Agreement:
-        """Return the comparison of ∇S_h in one stage of a step; named coefficients are replaced by their
-        expressions."""
+        """Compare ∇S_h in the program of phigen with ∇S_h derived by sympy.
+
+        The program computes ∇S_h in one stage of a step. Named coefficients in the program are replaced by their
+        expressions.
+        """
         scheme, h = self._compilation.scheme, self._dictionary.step
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)

@@ -33,7 +33,7 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
 
 
 def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on the method of a lattice, by the name of the group.
+    """Return the statements on the method of a lattice, as a map with one entry: title → statements.
 
     The statements for a splitting concern the parts of H and their flows. Those for a series concern the bi-realisation
     and the equation of a stage.

@@ -128,7 +128,7 @@ def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on the method of a compilation, by group, and those on its attitude.
+    """Return the statements on the method and on the attitude of a compilation, in groups: title → statements.
 
     The statements for a splitting concern its flows, and those for Gauss collocation its stages. Those for a series
     concern the axioms of the bi-realisation and the Hamilton–Jacobi equation.

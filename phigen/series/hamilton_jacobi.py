@@ -40,8 +40,8 @@ from phigen.symbolic.tower import Poly, Tower
 #: 4.3 to 10 operations for each monomial of the gradient.
 MOST_SLOPES = limits.OPERATIONS // 4
 
-#: From S_7 on, the sizes of later terms are predicted: they grow like a power of the index, and the exponent is
-#: determined from the terms computed so far.
+#: As soon as S_7 is computed, the sizes of the following terms are predicted. The sizes grow like a power of the index;
+#: the last two sizes give the exponent.
 FORESEEN = 7
 
 

@@ -131,10 +131,9 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """Return the coefficient of h^k in τ − σh/2, as a dictionary with the symbol τ as key.
+        """Return {τ: coefficient of h^k in τ − σh/2}, or {} if H does not depend on the time.
 
-        A step of size σh has its middle at the time τ, and begins at τ − σh/2. If H does not depend on the time, the
-        dictionary is empty.
+        A step of size σh has its middle at the time τ, and begins at τ − σh/2.
         """
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}

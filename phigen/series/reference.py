@@ -100,10 +100,9 @@ def _coefficient(
     x: Sequence[Any],
     times: Sequence[Any],
 ) -> Any:
-    """Return the coefficient of t^i in Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t.
+    """Return the coefficient of t^i in Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t, in the notation of the head of the file.
 
-    Here Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2. ``energy`` has the H_ν, ``source`` the a_μ of
-    each component, ``terms`` S_1 … S_i.
+    ``energy`` has the H_ν, ``source`` has the a_μ of each component of α, and ``terms`` has S_1 … S_i.
     """
     slopes = [[derivative(s, c) for s in terms] for c in x]
     operands = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]

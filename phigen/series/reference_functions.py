@@ -45,14 +45,17 @@ class Sign(sympy.Function):  # type: ignore[misc]
 
 
 def derivative(f: Any, variable: Any) -> Any:
-    """Return the partial derivative of a sympy expression, with the function `Sign` in place of |u| and sign u."""
+    """Return the partial derivative of a sympy expression.
+
+    Before the differentiation, sign u is replaced by Sign(u), and |u| by u Sign(u); see `Sign`.
+    """
     if f.has(sympy.Abs, sympy.sign):
         f = f.replace(sympy.Abs, lambda u: u * Sign(u)).replace(sympy.sign, Sign)
     return sympy.diff(f, variable)
 
 
 class Functions:
-    """The ring of polynomials over Q in the functions that some expressions contain."""
+    """The ring of polynomials over Q in the functions that occur in ``expressions``."""
 
     def __init__(self, expressions: Iterable[Any]) -> None:
         functions: dict[Any, None] = {}
@@ -67,7 +70,7 @@ class Functions:
         return iter(self._generators)
 
     def element(self, e: Any) -> Any:
-        """Return a sympy expression as an element of the ring, a polynomial in the functions."""
+        """Return the element of the ring that is equal to a sympy expression."""
         if e not in self._known:
             self._known[e] = self._element(e)
         return self._known[e]
@@ -96,7 +99,8 @@ class Functions:
         return self.ring.from_dict({monomial: c for monomial, c in result.items() if c})
 
     def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
-        """Return an element as a polynomial in some of the functions: a map from exponents to coefficients.
+        """Return an element as a polynomial in the functions ``variables``: a map from exponents to
+        coefficients.
 
         The coefficients are elements too.
         """
@@ -206,7 +210,8 @@ def _factors(e: Any) -> list[tuple[Any, int]]:
 def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
     """Return the factors of base^exponent as pairs (factor, exponent).
 
-    A common factor of the coefficients of the base is split off, so that equal powers have equal bases.
+    If the exponent is a number, a common factor of the coefficients of the base is split off: √(2x+2) becomes √2
+    √(x+1). So √(2x+2) and √(x+1) contain the same function √(x+1).
     """
     c, m = exponent.as_coeff_Mul(rational=True)
     if m != 1:
