@@ -23,7 +23,8 @@ _MOST = int(np.iinfo(np.int64).max)
 #: Largest finite number in single precision. States and parameters of C with ``real: float`` cannot be larger.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
-#: Largest values of the arguments that select random numbers: the largest values of the integer types that store them.
+#: Largest values of the arguments that select random numbers: the largest numbers of the types uint64, uint32 and
+#: int64.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 

@@ -1,4 +1,4 @@
-"""Declaration for ctypes of the functions in a shared library: the types of their arguments and results."""
+"""Functions of a shared library for calls by ctypes, with the types of their arguments and results."""
 
 from __future__ import annotations
 

@@ -29,8 +29,9 @@ _TIMED = {
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
-# Signatures of additional functions of systems with noise.
 _WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
+
+# Signatures of functions that only systems with noise have.
 _NOISY = {
     "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
     "integrate_along": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER)),

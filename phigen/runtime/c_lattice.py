@@ -361,9 +361,9 @@ class CLatticeSession:
 
 
 class CLattice:
-    """Solver of a lattice that calls the shared library of generated C files (name → text).
+    """Solver of a lattice in C. The C files are compiled to a shared library, whose functions the solver calls.
 
-    The object is a `phigen.runtime.lattice.LatticeBackend`.
+    ``files`` maps the names of the C files to their texts. The object is a `phigen.runtime.lattice.LatticeBackend`.
     """
 
     target = "c"

@@ -429,8 +429,10 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return [times ``t`` as a list], or [] if ``t`` is None, so that callers can combine it with other sequences by
-    ``zip``."""
+    """Return a list that contains the list of the times ``t``, or an empty list if ``t`` is None.
+
+    Callers pass the entries of the result to ``zip``.
+    """
     return [] if t is None else [t.tolist()]
 
 

@@ -72,7 +72,8 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
         stored_identity = json.loads(arrays.pop(_IDENTITY).tobytes())
     except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise MismatchError(f"{path} is not a checkpoint of phigen: {error}") from None
-    # JSON turns tuples into lists, so both identities are converted before they are compared.
+    # The stored identity comes from JSON, which turns tuples into lists. So the identity of this run is written as JSON
+    # and read again.
     expected_identity = json.loads(json.dumps(identity))
     differing = [key for key in expected_identity if stored_identity.get(key) != expected_identity[key]]
     if differing:

@@ -135,7 +135,9 @@ class LatticeSession(Protocol):
         ...
 
     def casimirs(self) -> Floats:
-        """Return the Casimirs as densities (Casimirs, *sizes); `reduced` makes sums and products of them."""
+        """Return the densities of the Casimirs at the sites (Casimirs, *sizes). `reduced` computes the Casimirs from
+        the densities.
+        """
         ...
 
     def vector_field(self) -> Floats:
@@ -243,7 +245,8 @@ class LatticeTrajectory:
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """Return a figure of the states: for a chain over space and time, for other lattices at some times.
+        """Return a figure of the states. The states of a chain are drawn over space and time, those of other lattices
+        at some times.
 
         Panels below show the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it.
         Raises `MissingPackageError` without matplotlib.

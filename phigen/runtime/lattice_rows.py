@@ -47,8 +47,9 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Return a few numbers that identify these rows. To be resumed, a run must have the same numbers as its
-        checkpoint.
+        """Return a few numbers that identify the rows.
+
+        A checkpoint stores the numbers. A run can be resumed only from a checkpoint with the same numbers.
         """
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]

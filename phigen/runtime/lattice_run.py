@@ -160,7 +160,7 @@ class LatticeRun:
         return finder
 
     def _advance(self, steps: int) -> None:
-        """Make whole steps, and store the crossings of the section that occur."""
+        """Make ``steps`` whole steps. If the run has a section, store each crossing of the section."""
         course, h = self.course, self.plan.at.h
         if self.finder is None:
             course.advance(h, steps)

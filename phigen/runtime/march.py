@@ -42,8 +42,8 @@ class Piece:
     turned: Floats
 
 
-#: Data of a row besides its state: the physical time since the start (NaN without a monitor), and the components of its
-#: attitude and position.
+#: Data of a row besides the state: the physical time since the start (NaN without a monitor), and the components of the
+#: reconstructed attitude and position.
 Mark = tuple[float, Floats]
 
 

@@ -117,7 +117,7 @@ class MemberBatch:
             self._leave(dict.fromkeys(failed_members.tolist(), "NOT_FINITE"))
 
     def _state(self) -> tuple[Floats, Floats]:
-        """Return the states of the remaining members, and the compensation terms of these states.
+        """Return the states of the members that have not failed, and the compensation terms of these states.
 
         If the method has a corrector, it is applied to the states that are returned.
         """
@@ -127,7 +127,9 @@ class MemberBatch:
         return end
 
     def _report(self) -> None:
-        """Copy states and attitudes of the remaining members to ``final`` and ``turned``."""
+        """For the members in ``numbers``, copy the states to the array ``final`` and the attitudes to the array
+        ``turned``.
+        """
         x, _ = self._state()
         self.final[self.numbers] = np.where(np.isfinite(x), x, self._before) if self._running else x
         if self._first is not None:
@@ -136,7 +138,7 @@ class MemberBatch:
             self.turned[self.numbers] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
 
     def _select_settings(self) -> None:
-        """Store the step sizes, initial times and random numbers of the remaining members."""
+        """Store the step sizes, initial times and random numbers of the members that have not failed."""
         left, draws = self._members.part(self.numbers), self._members.draws
         self._h, self._t0 = left.h[()], left.t0[()]
         if hasattr(self._module, "_drawing"):

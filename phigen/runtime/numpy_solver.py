@@ -269,9 +269,9 @@ class NumpySession:
         return buffer.getvalue()
 
     @classmethod
-    def from_bytes(cls, module: Any, parameters: Mapping[str, float], saved: bytes) -> NumpySession:
-        """Return the session from the bytes that `saved` returned."""
-        with np.load(io.BytesIO(saved)) as archive:
+    def from_bytes(cls, module: Any, parameters: Mapping[str, float], content: bytes) -> NumpySession:
+        """Return the session from the bytes ``content``, which the method `saved` of the session returned."""
+        with np.load(io.BytesIO(content)) as archive:
             gauge = archive["gauge"] if archive["gauge"].size else None
             draws = Draws(*archive["draws"].tolist())
             session = cls(module, parameters, archive["x"], archive["carry"], gauge, draws=draws)

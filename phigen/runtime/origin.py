@@ -67,8 +67,10 @@ class Origin:
 
 
 def origin_of(spec: Spec, run: Run | SweepSettings | None, command: str = "run") -> Origin:
-    """Return the origin of files that a command writes about a run or a sweep; ``run`` is None for a spec without
-    runs."""
+    """Return the `Origin` of the files that a command writes for a run or a sweep.
+
+    ``run`` is None for a spec without runs.
+    """
     return Origin(spec.name, run.name if run else "-", digest(spec), command)
 
 

@@ -54,7 +54,7 @@ class Propagation:
             arguments.count(self.stride, "stride", 1)
 
     def _expect_shared(self, lattice: LatticeInterface) -> None:
-        """Raise `TypeError` if a graph has no ``bonds``, or if a shared argument is not the name of a parameter."""
+        """Raise `TypeError` if ``shared`` lacks the ``bonds`` of a graph, or has a name that is not a parameter."""
         if lattice.graph and self.shared.get("bonds") is None:
             raise missing_bonds()
         arguments.expect_known([n for n in self.shared if n != "bonds" or not lattice.graph], lattice.parameters)

@@ -1,4 +1,4 @@
-"""Protocols of sessions: one trajectory that is computed step by step."""
+"""Types of sessions, as `typing.Protocol` classes. A session computes one trajectory step by step."""
 
 from __future__ import annotations
 

@@ -71,7 +71,9 @@ class Solver(Named[Backend, Interface]):
 
     @property
     def device(self) -> Any:
-        """The device that ensembles run on, with its ``name`` and ``memory`` in bytes; None for other targets."""
+        """The device that ensembles run on, with its ``name`` and its ``memory`` in bytes; None if the solver uses no
+        device.
+        """
         return getattr(self.backend, "device", None)
 
     def __repr__(self) -> str:

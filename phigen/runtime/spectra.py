@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 #: Smallest number of frames for a spectrum. The Hann window spreads a wave over about four frequencies, and a spectrum
 #: of fewer frames has fewer frequencies.
 LEAST_FRAMES = 4
-#: Relative difference below which two times between frames count as equal.
+#: Two intervals between successive frames count as equal if their relative difference is at most this number.
 _EQUAL = 1e-6
 
 
@@ -74,7 +74,7 @@ class DynamicSpectrum:
         zarr.consolidate_metadata(str(path))
 
     def plot(self, title: str = "") -> Figure:
-        """Return a picture of S over q and ω ≥ 0, on a logarithmic scale.
+        """Return a picture of the structure factor S(q, ω) for ω ≥ 0. The scale of S is logarithmic.
 
         For grids of two or three axes, q is along the first axis and 0 along the others. Raises `MissingPackageError`
         without matplotlib.
@@ -211,8 +211,8 @@ def expect_frames(t: Floats, h: float, after: float | None) -> None:
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times in ``t`` from the time ``after`` on. If h < 0, the run goes backwards, and these are the times
-    up to ``after``.
+    """Return the times in ``t`` that are at least ``after``. If h < 0, the run goes backwards, and the times that are
+    at most ``after`` are returned.
     """
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]

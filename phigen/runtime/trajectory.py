@@ -113,7 +113,8 @@ class Trajectory:
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write a file in the format that the suffix of the path names. Raises `ValueError` for other suffixes.
+        """Write the trajectory to a file, whose suffix selects the format. Raises `ValueError` for other
+        suffixes.
 
         A ``.csv`` has the columns ``t,x1,…,energy,C…`` and one line per row; every float reads back as the same float.
         A ``.npz`` has the arrays t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME
@@ -153,7 +154,9 @@ class Trajectory:
         )
 
     def scalars(self) -> dict[str, Any]:
-        """Return the entries of a ``.npz`` besides the columns: names of coordinates, steps, h and parameters."""
+        """Return the entries of a ``.npz`` besides the columns: the names of the coordinates, the number of steps, the
+        step size h, and the parameters.
+        """
         entries = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
         return {**entries, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
@@ -179,8 +182,10 @@ def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, 
 
 
 def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
-    """Return the columns for attitudes of the given shape, and for positions if ``position``; no columns for shape
-    ()."""
+    """Return the columns for attitudes of the given ``shape``; there are none for the shape ().
+
+    If ``position`` is true, the columns for positions follow.
+    """
     if not shape:
         return []
     rows = range(1, shape[0] + 1)

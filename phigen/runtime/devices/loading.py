@@ -1,4 +1,4 @@
-"""Construction of solvers on devices, each of which contains a solver for the host."""
+"""Construction of solvers on devices. A solver on a device contains a solver for the host."""
 
 from __future__ import annotations
 

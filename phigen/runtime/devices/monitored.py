@@ -89,7 +89,10 @@ class MonitoredSession(DeviceLatticeSession):
 
 
 def monitoring_module(text: str, name: str) -> Any:
-    """Return the NumPy module of a lattice in which a kernel on a device computes the energy of a part of H."""
+    """Load the generated NumPy module of a lattice.
+
+    In the module, the function for the energy of a part of H is replaced by one that calls a kernel on the device.
+    """
     module: Any = load_module(text, name)
     module._part_energy = lambda sites, part, x: sites.on_device.part_energy(part)
     return module
