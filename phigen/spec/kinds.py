@@ -92,7 +92,7 @@ class Kind:
         raise NotImplementedError
 
     def schema(self) -> Schema:
-        """Return the JSON Schema of the values."""
+        """Return the JSON Schema of the values of this kind."""
         raise NotImplementedError
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
@@ -130,7 +130,8 @@ class Text(Kind):
 
 @dataclass(frozen=True)
 class ShapedText(Kind):
-    """A text that matches ``pattern``. Messages call this text ``expected``.
+    """A text that matches the regular expression ``pattern``. In messages, the words in ``expected`` describe
+    the text.
 
     Messages about a text that does not match have the hint ``hint``. Messages about a node that is no text have the
     hint ``example``.
@@ -154,7 +155,9 @@ class ShapedText(Kind):
         return node if self.accepts(node, reader, f"write commas: {', '.join(names)}" if names else "") else None
 
     def accepts(self, node: Scalar, reader: Reader, hint: str = "") -> bool:
-        """Return whether the text matches and is not too long. Otherwise report an error with ``hint``."""
+        """Return whether the text of ``node`` matches ``pattern`` and is not too long. Otherwise report an error with
+        ``hint``.
+        """
         if len(node.text) > self.longest:
             message = f"the name {shown(node.text, 30)} has {len(node.text)} characters, the limit is {self.longest}"
             reader.error(node, message, limit=True)

@@ -355,8 +355,8 @@ class Axis:
 class Statistic:
     """Number that a sweep stores for an observable: a statistic over the run, or the value at its end.
 
-    ``of`` is ``mean``, ``std`` (standard deviation) or ``error`` (standard error of the mean); "" means the value at
-    the end.
+    The field ``of`` names the statistic: ``mean``, ``std`` (standard deviation) or ``error`` (standard error of the
+    mean). If the field is "", the number is the value at the end.
     """
 
     observable: str

@@ -127,8 +127,9 @@ def _row_times(
     step: Fraction | None,
     declared: Declarations,
 ) -> tuple[Fraction, ...]:
-    """Return the times of ``at`` in the order of the run, without repetitions. If the time ``end`` of the end is known,
-    later times are reported.
+    """Return the times in the key ``at`` of a run, in the order of the run, without repetitions.
+
+    If the end of the run is known, times outside the run are reported as errors.
     """
     nodes = raw.get("at") or ()
     if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):

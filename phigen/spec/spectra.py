@@ -29,7 +29,8 @@ def correlation_of(
 ) -> CorrelationChoice | None:
     """Return the setting ``correlation`` of the run ``name``; None if it is absent, or after reported errors.
 
-    ``sizes`` are the sizes of the axes in this run; the largest distance must be smaller.
+    ``sizes`` are the numbers of sites along the axes in this run. The largest distance of the correlation must be
+    smaller than the number of sites along its axis.
     """
     entries = raw.get("correlation")
     if entries is None or not _is_allowed(name, "correlation", raw, declared):

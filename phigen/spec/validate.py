@@ -85,7 +85,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if lattice is None:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
-    # Runs may record an observable that has an error, so that only the observable is reported.
+    # If the formula of an observable is wrong, the error is reported for the formula only, not for runs that record it.
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     watched = watched_names(declared, observed, numbers)
@@ -181,7 +181,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "terms": ((), "with noise, order: determines the method", "order: 2"),
     "adjoint": ((False,), "gradients of steps with noise are not available", ""),
 }
-#: Keys of runs that are refused with noise, and keys of runs that are allowed with noise only.
+#: Keys that a run with noise must not have, and keys that only a run with noise may have.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every", "at"), ("seed", "members")
 
 
