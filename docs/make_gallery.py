@@ -56,11 +56,11 @@ for your own spec.
 SYSTEMS = """
 ## Systems
 
-Each figure shows one run: of the runs in the spec, the one with the most steps. A dot marks the initial state. If a
-system has three coordinates, the figure also shows the level surface of its first Casimir. The line below the formulas
-names the form of the brackets π, the method, and the run. The page on the mathematics explains the [forms of π and the
-bi-realisations](mathematics.md#catalogue), [splittings](mathematics.md#splitting) and [Gauss
-collocation](mathematics.md#gauss-collocation).
+Each figure shows one run: of the runs in the spec, the one with the most steps. Of a long run, the figure shows at most
+the first 1500 steps. A dot marks the initial state. If a system has three coordinates, the figure also shows the level
+surface of its first Casimir. The line below the formulas names the form of the brackets π, the method, and the run. The
+page on the mathematics explains the [forms of π and the bi-realisations](mathematics.md#catalogue),
+[splittings](mathematics.md#splitting) and [Gauss collocation](mathematics.md#gauss-collocation).
 
 The tables list the largest errors over the whole run. The first column of numbers is for phigen. If there is a second
 column of numbers, it is for the classical method that the spec names, with the same step size. Errors are relative to
