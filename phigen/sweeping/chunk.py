@@ -122,13 +122,15 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
     if plan.frames:
         results["frames"] = _spread(np.moveaxis(states[: len(plan.rows)], 0, 1), allowed, count)
     if "energy_error" in plan.keep:
-        energy = job.module.hamiltonian(rows, **asked.parameters)
-        results["energy_error"] = _spread(np.abs(energy - energy[0]).max(axis=0), allowed, count)
+        with np.errstate(all="ignore"):  # failed members have states without a value
+            energy = job.module.hamiltonian(rows, **asked.parameters)
+            errors = np.abs(energy - energy[0]).max(axis=0)
+        results["energy_error"] = _spread(errors, allowed, count)
     if "casimir_error" in plan.keep:
-        casimirs = job.module.casimirs(rows, **asked.parameters)
-        results["casimir_error"] = _spread(
-            np.abs(casimirs - casimirs[0]).max(axis=(0, -1), initial=0.0), allowed, count
-        )
+        with np.errstate(all="ignore"):
+            casimirs = job.module.casimirs(rows, **asked.parameters)
+            errors = np.abs(casimirs - casimirs[0]).max(axis=(0, -1), initial=0.0)
+        results["casimir_error"] = _spread(errors, allowed, count)
     if "crossings" in plan.keep:
         results["crossings"] = _spread(_crossings(job, solver, asked), allowed, count)
     if "lyapunov" in plan.keep:

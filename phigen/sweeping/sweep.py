@@ -25,7 +25,7 @@ from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.spec.model import Run, Spec, SweepSettings
 from phigen.spec.names import KEPT
-from phigen.spec.problems import did_you_mean
+from phigen.spec.problems import counted, did_you_mean
 from phigen.sweeping import cluster, lattice_members, store
 from phigen.sweeping.devices import workers_of
 from phigen.sweeping.differences import differences
@@ -295,12 +295,20 @@ def _member_columns(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
 
     try:
         with opened_text(path) as file:
-            names, *rows = [row for row in csv.reader(file) if row] or [[]]
-        values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
+            reader = csv.reader(file)
+            (_, names), *rows = [(reader.line_num, row) for row in reader if row] or [(0, [])]
     except OSError as error:
         raise refused(error.strerror or str(error)) from None
     except (ValueError, csv.Error) as error:
         raise refused(f"expected a line of names, and lines of numbers: {error}") from None
+    values = np.empty((len(rows), len(names)))
+    for member, (line, row) in enumerate(rows):
+        if len(row) != len(names):
+            raise refused(f"line {line} has {counted(len(row), 'number')}, but there are {counted(len(names), 'name')}")
+        try:
+            values[member] = [float(entry) for entry in row]
+        except ValueError as error:
+            raise refused(f"line {line}: {error}", "columns have commas between them, and decimals a point") from None
     names = [name.strip() for name in names]
     known = {*(spec.coordinates if not spec.lattice else ()), *(p.name for p in spec.parameters), "step"}
     known |= {"start"} if spec.time else set()

@@ -367,8 +367,9 @@ def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
         ("I2\n", "it has no members"),
         ("I2, I2\n1, 2\n", "two columns have the same name"),
         ("I2, I4\n1, 2\n", "'I4' is not a parameter or a coordinate"),
-        ("I2\n1\nx\n", "expected a line of names, and lines of numbers"),
-        ("I2, I3\n1\n", "expected a line of names, and lines of numbers"),
+        ("I2\n1\nx\n", "line 3: could not convert string to float: 'x'"),
+        ("I2, I3\n\n1\n", "line 3 has 1 number, but there are 2 names"),
+        ("I2;I3\n1;2\n", "line 2: could not convert string to float: '1;2'"),
     ],
 )
 def test_a_file_of_members_that_cannot_be_read_is_refused_at_its_place(tmp_path, text, why):
