@@ -167,8 +167,8 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
     """Return the interval of times for which the bound holds, as its two ends.
 
-    ``times`` is the text of ``--time``. Without this option, the interval is that of the run if H depends on the time.
-    Otherwise both ends are the start of the run.
+    ``times`` is the text of ``--time``. If ``times`` is None and H depends on the time, the interval is that of the
+    run. If H does not depend on the time, both ends are the start of the run.
     """
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")

@@ -111,9 +111,14 @@ def _candidates(
 ) -> Iterator[list[Term]]:
     """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
-    The lists come in this order: terms as written; summands of H as single terms, not expanded into monomials; the
-    Hamiltonians of Kepler motions and rigid bodies as single terms; one sum for all terms that couple the same blocks
-    of π; terms after subtraction of companions (Casimirs and similar functions); and sums of groups of terms.
+    The lists come in this order:
+
+    - terms as written;
+    - summands of H as single terms, not expanded into monomials;
+    - the Hamiltonians of Kepler motions and rigid bodies as single terms;
+    - one sum for all terms that couple the same blocks of π;
+    - terms after subtraction of companions (Casimirs and similar functions);
+    - sums of groups of terms.
     """
     yield terms
     ring = conflicts.ring

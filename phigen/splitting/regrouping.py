@@ -24,8 +24,7 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Casimirs are computed only for sub-brackets with at most this number of coordinates. `_companions` defines
-#: sub-brackets.
+#: Largest number of coordinates of a sub-bracket whose Casimirs are computed. `_companions` explains sub-brackets.
 MOST_COORDINATES = 8
 
 
