@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7da3638976eb7f8fa508f5db4d6c58dcb434bb25edf7739953c1dc25da1bfd2c
+ * body-sha256: 1d063bf115f4dbdd5a31378b995eee52634205fa13a615dd4fd282b83a9bc6cc
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -70,7 +70,7 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Initialise *s with the state x0[field][site]. `work` has food_web_work_size(sizes, bonds->count) bytes,
    aligned as by malloc, and must outlive *s. `bonds` may be NULL if there are none, and `params` for the
-   defaults. All arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are not admissible, a bond does not
+   defaults. All arrays are copied. Returns food_web_BAD_ARGUMENT if sizes are refused, a bond does not
    connect two different sites, a value is not finite, or a parameter that must be positive is not. */
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);

@@ -54,7 +54,7 @@ MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: space is shorter.
 MOST_LETTERS = 160
 #: HIGHEST: largest order at which monitors are compared. SECONDS: largest duration of a run in seconds. A run with a
-#: monitor may have MOST · n steps, where n is the number of steps without a monitor, or FEWEST if that is larger.
+#: monitor may have MOST · n steps. n is the number of steps without a monitor, but at least FEWEST.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for runs. All builds are made before the runs.
 MEASURING = 0.25

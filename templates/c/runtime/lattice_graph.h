@@ -11,8 +11,8 @@ size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
 
 #if PHI_DEFAULTS
 /* Initialise *s with the state x0[field][site]. `work` has phi_work_size(sizes, bonds->count) bytes, aligned as by
-   malloc, and must outlive *s. `bonds` may be NULL if there are none, and `params` for the defaults. All arrays are copied.
-   Returns PHI_BAD_ARGUMENT if sizes are not admissible, a bond does not connect two different sites, a value is not
+   malloc, and must outlive *s. `bonds` may be NULL if there are none, and `params` for the defaults. All arrays are
+   copied. Returns PHI_BAD_ARGUMENT if sizes are refused, a bond does not connect two different sites, a value is not
    finite, or a parameter that must be positive is not. */
 #else
 /* Initialise *s with the state x0[field][site]. `work` has phi_work_size(sizes, bonds->count) bytes, aligned as by
