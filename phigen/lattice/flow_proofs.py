@@ -16,9 +16,20 @@ from phigen.lattice.site_parts import CellFlow, SiteFields, SiteMotion, summands
 from phigen.lattice.sweep_plans import SplittingPlan
 from phigen.splitting.ring import KICK, TIME
 from phigen.splitting.statements import angles_added
-from phigen.symbolic.expression import ONE, ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    derivatives,
+    number,
+    sparse_derivatives,
+    substitute,
+    symbol,
+    symbols_of,
+    total,
+)
 from phigen.symbolic.symbols import CHOSEN, Symbol
-from phigen.symbolic.verdict import Statement, decide_zero
+from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
 
 def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
@@ -35,14 +46,27 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     if cell.forces:
         yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
-        residuals = [r for motion in flow.every_motion for r in motion_residuals(motion)]
         part_name, field_name = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
         name = f"the flow Φ of {part_name} at each site: Φ_0 = 1, dΦ_t/dt = {field_name}∘Φ_t"
-        yield decide_zero(name, residuals, positive, flow.manner)
+        yield _flow_statement(name, flow, positive)
     for source, flow in zip(cell.noise, plan.noise, strict=True):
         residuals = [r for motion in flow.motions for r in motion_residuals(motion)]
         name = f"the flow Φ of the noise {source} at each site: Φ_0 = 1, dΦ_t/dt = ΔW σπ∇g∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)
+
+
+def _flow_statement(name: str, flow: CellFlow, positive: Sequence[str]) -> Statement:
+    """Return the statement that the motions of a flow solve their equations.
+
+    If the equation of `motion_residuals` is not proved, for instance for a drag proportional to p|p|, the equivalent
+    equation of `_transport_residuals` may be.
+    """
+    statement = decide_zero(name, [r for m in flow.every_motion for r in motion_residuals(m)], positive, flow.manner)
+    if statement.verdict != PROVED:
+        residuals = [r for m in flow.every_motion for r in _transport_residuals(m)]
+        transported = decide_zero(name, residuals, positive, flow.manner)
+        return transported if transported.verdict == PROVED else statement
+    return statement
 
 
 def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:
@@ -74,6 +98,24 @@ def motion_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
     yield from zip((f"{f} at t = 0" for f in names), start, strict=True)
     for f, a, b in zip(names, speeds, required, strict=True):
         yield f"rate of {f}", angles_added(a) - angles_added(b)
+    for f, rate in motion.rates.items():
+        if f not in motion.solution:
+            yield f"rate of {f}", rate
+
+
+def _transport_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
+    """Yield (field, residual). All residuals vanish if and only if the increments of a motion Φ_t solve ẋ = X(x), where
+    X has the components ``rates``.
+
+    The residuals are the components of Φ_0 − 1 and of dΦ_t/dt − DΦ_t X.
+    """
+    names, increments = list(motion.solution), list(motion.solution.values())
+    start = substitute(increments, {TIME: ZERO})
+    yield from zip((f"{f} at t = 0" for f in names), start, strict=True)
+    rows = sparse_derivatives(increments, motion.rates)
+    for f, speed, row in zip(names, derivatives(increments, TIME), rows, strict=True):
+        terms = [motion.rates.get(f, ZERO), *(row[n] * rate for n, rate in motion.rates.items() if n in row)]
+        yield f"rate of {f}", angles_added(speed) - angles_added(total(terms))
     for f, rate in motion.rates.items():
         if f not in motion.solution:
             yield f"rate of {f}", rate

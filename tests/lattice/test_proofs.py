@@ -45,6 +45,15 @@ def test_the_example_of_the_reference_is_proved() -> None:
     assert len(verdicts(example)) == 8
 
 
+@pytest.mark.parametrize("c", ["0.1", "{value: 0.1, positive: true}"])
+def test_drag_proportional_to_the_square_of_the_speed_is_proved(c: str) -> None:
+    text = (
+        "phigen: 1\nname: dragged\nlattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+        f"parameters: {{c: {c}}}\nhamiltonian: p**2/2 + (q[i+1] - q)**2/2\nforces: {{vector: {{p: -c*p*abs(p)}}}}\n"
+    )
+    assert set(verdicts(text).values()) == {PROVED}
+
+
 # --- planted errors
 
 

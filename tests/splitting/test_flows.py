@@ -163,6 +163,19 @@ def test_a_wrong_sign_in_one_flow_is_refuted(text, manners):
         assert [i for i, v in enumerate(verdicts) if v == REFUTED] == [k + 1]
 
 
+@pytest.mark.parametrize("drag", ["-c*p*abs(p)", "-c*abs(p)**3*p", "c*p*abs(p)"])
+@pytest.mark.parametrize("c", ["0.1", "{value: 0.1, positive: true}", "{value: 0.1, nonnegative: true}"])
+def test_drag_by_powers_of_the_speed_is_proved_and_drag_with_a_wrong_sign_refuted(drag, c):
+    text = PLANE + f"parameters: {{c: {c}}}\nhamiltonian: p**2/2 - cos(q)\nforces: {{vector: {{p: {drag}}}}}\n"
+    compilation = compile_text(text, scheme="splitting")
+    assert {s.verdict for s in check(compilation.system, compilation.splitting)} == {PROVED}
+    flows = compilation.splitting.flows
+    k = next(k for k, flow in enumerate(flows) if flow.force)
+    wrong = replace(flows[k], increment=tuple(-e for e in flows[k].increment))
+    planted = replace(compilation.splitting, flows=(*flows[:k], wrong, *flows[k + 1 :]))
+    assert [s.verdict for s in check(compilation.system, planted)].count(REFUTED) == 1
+
+
 def test_a_part_left_out_is_refuted():
     compilation = compile_text(BODY + "hamiltonian: x**4 + y**4 + z**4\n", scheme="splitting")
     planted = replace(compilation.splitting, flows=compilation.splitting.flows[1:])
