@@ -41,6 +41,7 @@ INNER_MASS = Symbol("inner", "mass")
 
 #: Key of specs that selects relative coordinates, and the value of this key for Jacobi coordinates.
 KEY, JACOBI = "coordinates_from", "jacobi"
+_COORDINATES = {JACOBI: "Jacobi", "democratic_heliocentric": "democratic heliocentric"}
 
 _FORM = (
     "hamiltonian: {sites: (px**2 + py**2)/(2*m), pairs: -G*m[a]*m[b]/sqrt((x[a] - x[b])**2 + (y[a] - y[b])**2)}, "
@@ -99,6 +100,11 @@ class LatticeBodies:
         """Return the flows of the parts of H in relative coordinates: Kepler motions, then the remainder."""
         return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
 
+    def named(self, flow: CellFlow) -> str:
+        """Return the name of the part of H that has this flow, for comments of generated code."""
+        part = "H - A, where A is the Hamiltonian" if flow.motion is None else "A, the Hamiltonian"
+        return f"{part} of the Kepler motions in {_COORDINATES[self.change]} coordinates"
+
     def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
         """Return the data that runtimes need about the bodies; ``flows`` are the flows of the parts of H in the order
         of a step.
@@ -120,7 +126,7 @@ class LatticeBodies:
         """Return the flow of the remainder B = H − A, where A is the Hamiltonian of the Kepler motions.
 
         The attribute ``hamiltonian`` of the flow is the energy of attraction between two bodies. In Jacobi coordinates,
-        γ M_i m_i/|Q_i| is added, for the Kepler motion of body i.
+        γ (M_i − m_i) m_i/|Q_i| is added, minus the potential energy in the Kepler motion of body i.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
@@ -134,7 +140,8 @@ class LatticeBodies:
         motion = SiteMotion(0, increments, (pulls,), rates, increments, manner)
         density = self.cell.pair_hamiltonian
         if self.jacobi:
-            density = density + self.gravity * symbol(INNER_MASS) * symbol(self.mass) * inverse_length(q)
+            others = symbol(INNER_MASS) - symbol(self.mass)
+            density = density + self.gravity * others * symbol(self.mass) * inverse_length(q)
         listed = (*increments.values(), *pulls.values.values())
         return CellFlow(density, listed, manner, (motion,), ((Summand(density, bond=True), (0,)),))
 

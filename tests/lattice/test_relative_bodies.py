@@ -408,6 +408,15 @@ def test_threads_do_not_change_the_bits(change: str) -> None:
     assert all(np.array_equal(first, other) for other in others)
 
 
+@pytest.mark.parametrize("target", ["c", "js"])
+def test_comments_name_the_parts_of_h_and_no_internal_symbols(target: str) -> None:
+    compilation = compile_spec(phigen.spec.loads(text()))
+    generated = " ".join("".join(emit(compilation.program, target, "phigen").values()).split())
+    assert "inner:" not in generated
+    for part in ("H_1 = A, the Hamiltonian of", "H_2 = H - A, where A is the Hamiltonian of"):
+        assert f"The flow of {part} the Kepler motions in Jacobi coordinates" in re.sub(r" (\*|#) ", " ", generated)
+
+
 @pytest.mark.parametrize(("change", "most"), [("jacobi", 920), ("democratic_heliocentric", 890)])
 def test_short_code_makes_the_same_steps_by_any_number_of_threads(change: str, most: int) -> None:
     x, m = orbits(1200), np.zeros(1200)
