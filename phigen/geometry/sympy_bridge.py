@@ -15,6 +15,7 @@ import sympy
 from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.spec import limits
 from phigen.spec.model import MatrixForm, Parameter
+from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
     EULER,
@@ -80,7 +81,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
     function = FUNCTIONS.get(name)
     if function and function.arity == len(args) and (name == "sign" or not function.own):
         return call(name, *args)
-    raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=f"known functions: {', '.join(FUNCTIONS)}")])
+    hint = f"functions are {', '.join(SPEC_FUNCTIONS)}"
+    raise SpecError([Diagnostic(f"{e} has no counterpart in phigen", hint=hint)])
 
 
 def _rational(e: Any) -> Fraction:

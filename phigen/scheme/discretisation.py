@@ -211,7 +211,8 @@ def _forced(
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector force needs a bi-realisation in closed form, but {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
-        raise SpecError([Diagnostic(reason, place, "use a covector force, or choose another birealisation")])
+        hint = "use a covector force, another birealisation, or scheme: splitting"
+        raise SpecError([Diagnostic(reason, place, hint)])
     lowest = 2 if series.symmetric else 1
     if order.order > lowest and (composition == "none" or not series.symmetric):
         reason = f"with forces, {realisation.kind} has order {lowest} without a composition, not {order.order}"

@@ -273,7 +273,7 @@ def test_the_code_does_not_claim_a_poisson_map():
         ("scheme: splitting\nforces: {covector: {x: y**2}}", "the force ζ_x = y\\*\\*2 has no elementary flow"),
         ("scheme: splitting\ndamping: lam*z", "the damping of x, y, z has no elementary flow"),
         ("order: 4\ncomposition: none", "has order 2 without a composition"),
-        ("birealisation: karasev\nforces: {vector: {x: 1}}", "a vector force needs a bi-realisation in closed form"),
+        ("birealisation: karasev\nforces: {vector: {x: 1}}", "use a covector force, .*, or scheme: splitting"),
         ("order: 2\nmodified_hamiltonian: 1", "not offered for a system with forces"),
     ],
 )

@@ -76,6 +76,11 @@ def test_what_has_no_counterpart_is_refused(bad):
         expression(bad)
 
 
+def test_a_refused_function_is_answered_with_the_functions_of_specs():
+    with pytest.raises(SpecError, match=r"hint: functions are sqrt, exp, log, .*, abs$"):
+        expression(sympy.erf(x))
+
+
 OUT_OF_RANGE = {
     "integer": 10**400,
     "integer that cannot be printed": -(10**5000),
