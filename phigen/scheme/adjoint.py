@@ -14,7 +14,7 @@ cotangent of x is λ + μ. The cotangent of a coefficient is the derivative of �
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
@@ -160,19 +160,37 @@ def completed(
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
         differentiated["gauge"] = (LEVEL,)
-    prepare_adjoint = _prepare_adjoint(prepare, differentiated)
+    unused = frozenset() if path else _unused_coefficients(steps)
+    prepared_symbols = coefficients.prepared_symbols
     refresh_adjoint = refresh and pulled_back(
         refresh,
         "refresh_adjoint",
-        {"now_bar": refresh.outputs[0].values},
-        {TABLE: coefficients.prepared_symbols},
+        {"now_bar": _without_unused(refresh.outputs[0].values, unused, len(prepared_symbols))},
+        {TABLE: prepared_symbols},
         "cotangents of the constant coefficients, from those of the coefficients that change during a run",
     )
+    if refresh_adjoint:
+        unused &= _unused_coefficients([refresh_adjoint])
+    prepare_adjoint = _prepare_adjoint(prepare, differentiated, unused)
     constant = _constant_coefficients(coefficients, differentiated)
     return Adjoint(tuple(_without(kernel, constant) for kernel in steps), prepare_adjoint, refresh_adjoint, path)
 
 
-def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
+def _unused_coefficients(kernels: Sequence[Kernel]) -> frozenset[int]:
+    """Return the indices of coefficients whose cotangents are 0 in all these transposed kernels. Coefficients of
+    attitudes are of this kind, since attitudes are not differentiated.
+    """
+    rows = [o.values for kernel in kernels for o in kernel.outputs if o.name == f"{TABLE}_bar"]
+    used = {k for values in rows for k, e in enumerate(values) if not e.is_zero}
+    return frozenset(range(max(map(len, rows), default=0))) - used
+
+
+def _without_unused(values: Sequence[Expression], unused: Collection[int], first: int = 0) -> list[Expression]:
+    """Return coefficients with those in ``unused`` replaced by 0; ``first`` is the index of the first coefficient."""
+    return [ZERO if k in unused else e for k, e in enumerate(values, first)]
+
+
+def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]], unused: Collection[int]) -> Kernel:
     """Return the transpose of ``prepare``, the kernel that computes the coefficients from the parameters.
 
     ``differentiated`` are the symbols whose cotangents are computed, by input array: the parameters, and the energy
@@ -182,7 +200,7 @@ def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]
     table_values = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]
     values = table_values[: len(table_values) - len(exponents)]
-    seeds = {"coef_bar": [*values, *[ZERO] * len(exponents)]}
+    seeds = {"coef_bar": [*_without_unused(values, unused), *[ZERO] * len(exponents)]}
     purpose = "cotangents of the parameters, from those of the coefficients"
     if {s for symbols in differentiated.values() for s in symbols}.isdisjoint(symbols_of(*exponents)):
         return pulled_back(prepare, "prepare_adjoint", seeds, differentiated, purpose)

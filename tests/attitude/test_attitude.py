@@ -689,3 +689,23 @@ def test_javascript_has_the_derivative_of_a_step_with_an_attitude(case):
     derivative = javascript(compilation, f"x0: {x0.tolist()}", "", "Array.from(s.stepTangent(0.3))")
     _, tangent = solver_of(compilation, "numpy").step_tangent(x0, 0.3)
     assert np.reshape(derivative, tangent.shape) == pytest.approx(tangent, abs=1e-14)
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("term", ["b*x2", "b*x2*cos(t)"])
+def test_gradients_leave_out_coefficients_of_attitudes(term, target):
+    """The angle of the rotation by b*x2 does not depend on the state, so its quaternion consists of coefficients."""
+    text = (
+        BODY.replace("/2\n", f"/2 + {term}\n")
+        .replace("parameters:", "time: t\nparameters:" if "t" in term else "parameters:")
+        .replace("I3: 3", "I3: 3, b: 0.7")
+        + "scheme: splitting\n"
+    )
+    turning = solver_of(compile_spec(spec_of(text), order=4, adjoint=True), target)
+    plain = solver_of(
+        compile_spec(spec_of(text.replace("reconstruct: quaternion\n", "")), order=4, adjoint=True), target
+    )
+    at, bar = np.array([0.4, -0.3, 0.8]), np.array([1.0, -0.5, 0.2])
+    pulled, expected = (s.pullback(at, 0.3, 4, bar) for s in (turning, plain))
+    assert pulled.x0_bar == pytest.approx(expected.x0_bar, rel=1e-13)
+    assert pulled.parameters_bar == pytest.approx(expected.parameters_bar, rel=1e-12)
