@@ -354,8 +354,8 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
     With the key ``coordinates_from``, there is one part for each body. Otherwise the flow of a part may be a motion,
     such as a Kepler motion. `_turns_bodies` decides whether motions of free rigid bodies are allowed. If the spec has a
-    monitor, H is split without motions. H is also split without motions if the spec names a composition, and the flow
-    of H itself is a motion.
+    monitor, H is split without motions. A composition needs several flows: if the spec names a composition, and one
+    motion is the flow of the whole H, then H is also split without motions.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)

@@ -151,11 +151,11 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # "rest" adds an error for the omitted terms of a Taylor series. Its arguments are the list ``a``. The
-            # number a[2] is a lower bound for the divisors of the omitted terms. The C may omit the terms a[3:], and
-            # omits all later terms. The error bound is 3 (tail + 2 Σ |a[3:]|)/a[2]. Here tail is a bound, on a box that
-            # contains the path, for the Taylor coefficient of the same order as a[3]. By Lagrange's form of the
-            # remainder, tail also bounds the sum of all terms from a[3] on.
+            # "rest" adds an error for the terms that the C leaves out of a Taylor series. The C adds all terms before
+            # a[3], perhaps some of the terms a[3:], and no later terms. The sum of all terms from a[3] on is at most
+            # ``tail``, by Lagrange's form of the remainder. The sum of those that the C adds is at most Σ |a[3:]|. In
+            # the mean of a path, each term has a divisor of at least a[2]; otherwise a[2] is 1. The factors 3 and 2
+            # enlarge the bound, so that it also covers derivatives of the series.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]

@@ -293,8 +293,7 @@ def _along_path(
 ) -> Stage:
     """Return stage ``k`` of a step along paths.
 
-    The C computes the Taylor series of each path with ``least`` to ``max_terms`` terms. It computes at least ``least``
-    terms because the series of coordinate number ``coordinate`` has a large term.
+    The C computes each path by a Taylor series. `_orders` explains ``least``, ``max_terms`` and ``coordinate``.
     """
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)

@@ -123,8 +123,9 @@ def gauss_adjoint(
     of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j
     μ_ji ζ_j. Fixed-point sweeps solve these equations.
 
-    The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes the contribution of
-    one stage to the cotangents of x and of the coefficients. The third kernel is the transpose of D.
+    The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes what one stage
+    contributes to the cotangents of x and of the values in the table ``coefficients``. The third kernel is the
+    transpose of D.
     """
     seeds = {"move_bar": field.outputs[0].values}
     start = {"x": tuple(coordinates), TABLE: coefficients.table}

@@ -69,9 +69,9 @@ def _method(name: str, order: int, first: str, times: str, error: float, multipl
     return Nystrom(name, order, first == "V", (*first_times, *first_times[-2::-1]), (*kicks, *mirrored), error)
 
 
-#: Durations of the flows, in units of the step, of the methods SRKN_6^b and SRKN_14^a by S. Blanes, P. C. Moan,
-#: Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002). The
-#: paper gives 15 digits. The further digits were computed by Newton's method.
+#: Times t_i in the first half of a step, for the methods SRKN_6^b and SRKN_14^a. The methods are from S. Blanes, P. C.
+#: Moan, Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142
+#: (2002). The paper gives 15 digits. The further digits were computed by Newton's method.
 _SRKN6B = """
     0.082984406417404976396007246036789421 0.245298957184271116624067925015978842
     0.396309801498368038617837686730772926 0.604872665711079915617327045447534800

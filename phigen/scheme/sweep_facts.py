@@ -105,8 +105,8 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether, in the reverse pass on a grid, the loop of a flow also adds the cotangents that the flow before it
-    passed to other sites. Otherwise separate loops add these cotangents.
+    """Whether each loop of the reverse pass on a grid adds the cotangents that the previous loop passed to other sites.
+    Otherwise separate loops add these cotangents.
 
     Loops that also add cotangents are long, and are used only in the profile ``fast``.
     """
