@@ -105,7 +105,7 @@ class Colouring:
         seam, of width 1, the last colour of a period does not occur.
         """
         seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
-        if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
+        if len(seam_weights) > 1 or seam_weights[0][0].min_length > 1:
             return set(range(self.count))
         ((seam, weight),) = seam_weights
         return {weight * k % self.count for k in range(seam.period - 1)}
@@ -160,9 +160,9 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the boundary seam along an axis.
 
-    The flow of a term of H updates sites up to the distance ``near`` (a member of `Seam`) from the site where the term
-    begins. If the value of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no
-    sites beyond this distance. Otherwise a seam must be wider.
+    The flow of a term of H updates sites up to the distance ``Seam.margin`` from the site where the term begins. If the
+    value of each bracket {f, g} depends only on the sites of f and g, the equations of motion read no sites beyond this
+    distance. Otherwise a seam must be wider.
     """
     if period == 1:
         return Seam()
@@ -173,9 +173,9 @@ def _seam(cell: Cell, axis: int, period: int) -> Seam:
         for (_, other), entry in cell.bracket.items()
         for _, offset in cell.places(entry).values()
     )
-    wide = reach if cell.is_local else reach + separation if is_between else 2 * separation + poisson_reach
+    min_length = reach if cell.is_local else reach + separation if is_between else 2 * separation + poisson_reach
     damping = [] if cell.forces.damping is None else cell.places(cell.forces.damping).values()
-    return Seam(period, max([wide, *(reach + abs(steps(offset)[axis]) for _, offset in damping)]), separation)
+    return Seam(period, max([min_length, *(reach + abs(steps(offset)[axis]) for _, offset in damping)]), separation)
 
 
 def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:

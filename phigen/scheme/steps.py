@@ -30,8 +30,9 @@ class PathAdjoint:
 
     ``recurrences`` follow the path backwards, together with cotangents. The last of these cotangents are those of the
     coefficients that the path reads; ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and
-    its Hessian at the mean of the path. ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes``
-    are the recurrences for the derivatives of a path. With these derivatives, many paths are transposed at once.
+    its Hessian at the mean of the path. ``slope`` computes the cotangents of the coefficients of S_h from the cotangent
+    of p = ∇S_h. ``slopes`` are recurrences for the derivatives of a path with respect to its start, to p and to
+    coefficients. These recurrences are used where many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -523,21 +524,23 @@ class Seam:
     colouring.
 
     The seam consists of the last sites of the axis. Let r be the remainder when the size is divided by the period. The
-    seam has r sites plus the smallest number of whole periods that makes it at least ``wide`` sites long. The terms of
-    H that start on the seam are separate parts; they update the seam and the sites within the distance ``near`` of it.
-    All other terms are coloured as on a lattice without a seam.
+    seam has r sites plus the smallest number of whole periods that makes it at least ``min_length`` sites long. The
+    terms of H that start on the seam are separate parts; they update the seam and up to ``margin`` sites on each side
+    of it. All other terms are coloured as on a lattice without a seam.
     """
 
     period: int = 1
-    wide: int = 0
-    near: int = 0
+    min_length: int = 0
+    margin: int = 0
 
     @property
     def min_size(self) -> int:
-        """The smallest allowed size of the axis: that of the longest possible seam, ``wide`` + ``period`` − 1 sites,
-        plus ``wide`` sites.
+        """The smallest allowed number of sites along the axis.
+
+        The longest possible seam has ``min_length`` + ``period`` − 1 sites. The rest of the axis must have
+        ``min_length`` sites.
         """
-        return 2 * self.wide + self.period - 1
+        return 2 * self.min_length + self.period - 1
 
 
 @dataclass(frozen=True)

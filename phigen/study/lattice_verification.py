@@ -394,7 +394,7 @@ def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
     """
     seams = subject.compilation.sweeps.colouring.seams
     for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
-        sizes[axis] += 2 * seam.near * (len(seams) < 3)
+        sizes[axis] += 2 * seam.margin * (len(seams) < 3)
         sizes[axis] += (size - sizes[axis]) % seam.period
     return sizes
 

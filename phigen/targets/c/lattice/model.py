@@ -284,7 +284,7 @@ def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, objec
             _braced([_braced(pair) for pair in bounds(w.key)]) for w in layout.lattice.weights if several
         ),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and (several or sites.seams) else "",
-        "seams": ", ".join(_braced([s.period, s.wide, s.near]) for s in sites.seams),
+        "seams": ", ".join(_braced([s.period, s.min_length, s.margin]) for s in sites.seams),
         "graph": layout.graph,
         "body_axes": ", ".join(_braced(axis) for axis in step.relative.axes) if step.relative else "",
         "stages": ", ".join(stages),
