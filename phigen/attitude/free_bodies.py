@@ -153,7 +153,8 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression for the shortest rotation that takes x' to x.
 
     Let the quaternion M, of any length, be this rotation, and ω any angular velocity. If all expressions are 0, two
-    equations hold: M x' = x and, up to the length of M, Ṁ = M(ω − θ̇x')/2. The head of the file has the formula for θ̇.
+    statements hold: M rotates x' to x; and the vector part of M⁻¹Ṁ is (ω − θ̇x')/2. The head of the file has the
+    formula for θ̇.
     """
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]

@@ -126,7 +126,7 @@ class LatticeBodies:
         """Return the flow of the remainder B = H − A, where A is the Hamiltonian of the Kepler motions.
 
         The attribute ``hamiltonian`` of the flow is the energy of attraction between two bodies. In Jacobi coordinates,
-        γ (M_i − m_i) m_i/|Q_i| is added, minus the potential energy in the Kepler motion of body i.
+        the energy −γ (M_i − m_i) m_i/|Q_i| belongs to A, and is subtracted. The head of the file explains M_i and Q_i.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]

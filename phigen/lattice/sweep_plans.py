@@ -252,8 +252,8 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
     """For each set of boundary seams, yield the flow of the terms that begin on exactly these seams.
 
-    ``flow`` is the flow of a part, with the terms that begin on no seam. Nothing is yielded if no term of the part
-    begins on a seam.
+    ``flow`` is the flow of those terms of a part of H that begin on no seam. If the part has no other terms, nothing is
+    yielded.
     """
     colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):

@@ -73,9 +73,9 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
     """Return ideals of the algebra that commute with each other. An ideal is a list of indices of basis elements that
     span it.
 
-    Each basis element that has nonzero brackets is in one of the ideals. All other basis elements are left out, since
-    π(x)p has no component along them. Ideals may share central elements, such as the element that a central extension
-    adds.
+    Each basis element that has nonzero brackets is in exactly one ideal. An ideal also contains the central basis
+    elements that occur in its brackets. So two ideals may share a central element, such as the element that a central
+    extension adds. All other central basis elements are left out, since π does not depend on them.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}

@@ -1,13 +1,13 @@
 """Bi-realisation of any smooth π by Karasev's construction: the solver follows a path numerically.
 
-Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with constant p. Then α is the start of this path, β its end, and x its mean ∫₀¹ m
-dt. A step from the state x₀ solves p = ∇S_h(mean of the path that starts at x₀) for p; the new state is the end of this
-path. The path is a trajectory of the linear Hamiltonian p·x, so it stays on its symplectic leaf for every p. If the
-path is exact to round-off, the step is a Poisson map to round-off.
+Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with constant p. Then α is the start of this path, β its end, and y its mean ∫₀¹ m
+dt. A step from the state x₀ solves p = ∇S_h(y) for p, where y is the mean of the path that starts at x₀; the new state
+is the end of this path. The path is a trajectory of the linear Hamiltonian p·x, so it stays on its symplectic leaf for
+every p. If the path is exact to round-off, the step is a Poisson map to round-off.
 
-The S_i are computed from formal series. The mean of the path that starts at x is Σ D^j x/(j+1)! with D = Σ (πp)_a ∂_a.
-α is the inverse of the map from x to this mean. S_1 … S_k require α up to degree k − 1 in p. If π is linear, α and β
-are the maps of the exponential bi-realisation.
+The generating function S_h = Σ h^i S_i is computed from a formal series for α. A path from x has the mean y = Σ D^j
+x/(j+1)! with D = Σ (πp)_a ∂_a. This series is solved for x = α(y, p). S_1 … S_k require α up to degree k − 1 in p. If π
+is linear, α and β are the maps of the exponential bi-realisation.
 """
 
 from __future__ import annotations

@@ -135,8 +135,8 @@ class LatticeSession(Protocol):
         ...
 
     def casimirs(self) -> Floats:
-        """Return the densities of the Casimirs at the sites (Casimirs, *sizes). `reduced` computes the Casimirs from
-        the densities.
+        """Return an array (Casimirs, *sizes): the density of each Casimir at each site. `reduced` computes the Casimirs
+        from the densities.
         """
         ...
 

@@ -85,7 +85,8 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if lattice is None:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
-    # If the formula of an observable is wrong, the error is reported for the formula only, not for runs that record it.
+    # An error in the formula of an observable is reported for the formula only. It is not reported again for runs that
+    # record the observable.
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     watched = watched_names(declared, observed, numbers)
