@@ -229,7 +229,7 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 class _LaneLayout(PathLayout):
     """The places of the values of a path in one SIMD lane. The record ``e`` has the values of all lanes.
 
-    The last series are needed only for derivatives of the path. They have an array of their own.
+    Additional values, which only the derivatives of the path need, are in separate arrays.
     """
 
     def __init__(self, path: Recurrences) -> None:

@@ -52,8 +52,8 @@ class Motion:
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
     """Return the equations of motion along a vector field.
 
-    For each coordinate that is not constant, the result has linear differential equations if phigen finds them.
-    Otherwise it has only the time derivative of the coordinate.
+    Constant coordinates have no equations. For each other coordinate, phigen searches for linear differential
+    equations. If the search fails, the result has the time derivative of this coordinate instead.
     """
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}

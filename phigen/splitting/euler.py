@@ -11,7 +11,7 @@ t:
 where σ_i > 0, except that σ_i = C for the smallest E_i. The time enters only through κ. So an error of κ changes only
 the time over which the body moves; energy and Casimirs stay constant. No phase is stored between steps, and no formula
 divides by the difference of two moments of inertia. So the separatrix, rotations about an axis and symmetric bodies are
-not special cases. Near the separatrix, R is as accurate as those x_i that are small there.
+not special cases. Near the separatrix, R is a small difference of two E_i, and has the rounding errors of both.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -233,10 +233,11 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression for the functions S and C of κ in `phigen.symbolic.elliptic`.
+    """Yield pairs of a label and an expression. If all expressions are 0, the functions S and C of κ satisfy three
+    formulas: C² + PS² = 1; dS/dt = C dn; and 1 − C = 8z/(1 + z)² with z = Pκ².
 
-    All expressions vanish if three formulas hold: C² + PS² = 1; dS/dt = C dn; and 1 − C = 8z/(1 + z)² with z = Pκ².
-    Here dn is Jacobi's function. The second formula is derived from dκ/dt = (1 + z) dn/4.
+    `phigen.symbolic.elliptic` defines S, C and κ. Here dn is Jacobi's function. The second formula is derived from
+    dκ/dt = (1 + z) dn/4.
     """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)

@@ -31,12 +31,14 @@ SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
-    """Return the terms of H, in which the Hamiltonian of each Kepler motion is a single term. These terms are first in
-    the list. Returns None if no term of this kind is found.
+    """Return H as a list of terms, which begins with the Hamiltonians of Kepler motions.
 
-    If ``rigid``, the Hamiltonians of free rigid bodies are single terms too. Each of these Hamiltonians depends on one
-    body only. A term with coordinates of two bodies is not expanded: (p_1 + p_2)² stays one term, which commutes with
-    functions of q_1 − q_2.
+    The Hamiltonian of each Kepler motion is a single term. If the argument ``rigid`` is true, the Hamiltonians of free
+    rigid bodies follow. Each of them is a single term too, and depends on one body only. Returns None if H contains no
+    motion of these kinds.
+
+    A term with coordinates of two bodies is not expanded: (p_1 + p_2)² stays one term, which commutes with functions of
+    q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:

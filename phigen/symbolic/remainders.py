@@ -29,8 +29,8 @@ QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 #: MAX_ROOT. Then TERMS terms of the series of e^y are summed; the omitted terms are below 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
-#: Number of halvings of the argument t in SIMD code. The number is constant, since SIMD code has no branches. Two
-#: halvings suffice for roots up to 4 `MAX_ROOT`.
+#: Number of halvings of t in SIMD code. The number is constant, since SIMD code has no branches. Two halvings suffice
+#: if the bound for the roots of p is at most 4 `MAX_ROOT` at first.
 LANE_DOUBLINGS = 2
 
 

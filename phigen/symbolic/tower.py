@@ -258,8 +258,9 @@ class Tower(Arithmetic[Poly]):
         return self._generator(name, args)
 
     def _entire(self, name: str, s: Poly) -> Poly:
-        """Return the value at s of a function of `ENTIRE`, expressed by cosroot, sinroot, exp and 1/s.
+        """Return the value of the function ``name`` at s; `ENTIRE` defines the function.
 
+        The value is written with exp, 1/s, cosroot and sinroot. Here cosroot(s) = cos √s and sinroot(s) = sin(√s)/√s.
         If cosroot(s) or sinroot(s) is needed, the ring receives both as generators.
         """
         if s.is_constant() and s == 0:

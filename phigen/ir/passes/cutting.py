@@ -63,8 +63,8 @@ def _part(
 ) -> list[ir.Statement]:
     """Return the body of one part of the divided function.
 
-    ``chunk`` has the statements that belong to the part. ``crossing`` maps each temporary that several parts use to its
-    entry of the workspace array.
+    ``chunk`` has the statements that belong to the part. ``crossing`` has an entry of the workspace array for each
+    temporary that several parts use.
     """
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:

@@ -123,8 +123,8 @@ _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
     """Return a map and a list of statements.
 
-    The map says what the generated function stores for other sites: number of an array → value that is stored in this
-    array. The statements store all results of a site.
+    The map has the values that a site stores for its neighbours: number of an array → value that is stored in this
+    array. The statements store these values, and all other results of the site.
     """
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
@@ -233,8 +233,8 @@ class BondTranspose:
     """The transpose of a function that computes sums over bonds or pairs. There is one transpose for each end of the
     bonds: ``end`` is "a" or "b".
 
-    The cotangents of the ``count`` sums are in the arrays from number ``sums_from`` on. ``oriented`` are the names of
-    parameters at bonds that have the opposite sign for the site at the end b.
+    The cotangents of the ``count`` sums are in the arrays from number ``sums_from`` on. ``oriented`` are names of
+    parameters at bonds. The site at the end b of a bond reads these parameters with the opposite sign.
     """
 
     function: ir.Function
