@@ -45,10 +45,10 @@ from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 
 #: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: The three constants limit the candidate monitors. MOST_BASES: largest number of expressions b in H, such as the
-#: square r² of a distance, that candidates contain. QUARTERS: values of k, the most promising first, in the candidates
-#: (r²)^(k/4) and (1 + Σ 1/b)^(−k/4). OF_SPEED: values of k in the candidates (1 + v²/m)^(−k/4). Here v is the speed
-#: |π∇H|, and m is the median of v² along the motion.
+#: The three constants limit the candidate monitors. MOST_BASES: candidates are built from at most this number of
+#: expressions b in H, such as the square of a distance. QUARTERS: values of k, the most promising first, in the
+#: candidates b^(k/4) and (1 + Σ 1/b)^(−k/4). OF_SPEED: values of k in the candidates (1 + v²/m)^(−k/4). Here v is the
+#: speed |π∇H|, and m is the median of v² along the motion.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. A monitor with two distances in
 #: space is shorter.

@@ -81,8 +81,8 @@ def unrestricted(program: Program, code: str) -> str:
 
 
 def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
-    """Return the assembler of the C of a solver, and the names of two files of the runtime. The header of the solver
-    begins with the first file, and the source with the second.
+    """Return the object that assembles the C code of a solver, and the names of two files of the runtime. The header of
+    the solver begins with the first file, and the source with the second.
     """
     lanes = in_lanes(program)
     has = switches(program, lanes)

@@ -45,8 +45,9 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: Number of values of ẋ from which the increment of a stage is predicted: at the end and the start of the present step,
-#: and at the starts of earlier steps.
+#: Number of values of ẋ from which the increment of a stage is predicted. The times of these values are the end of the
+#: present step, the start of this step, and the starts of earlier steps. An explicit method predicts the state at the
+#: end of the step.
 KNOTS = 4
 
 

@@ -231,9 +231,9 @@ PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[s
 
 
 def part(name: str, switches: Mapping[str, bool]) -> list[str]:
-    """Return the lines for ``#state NAME`` of a solver with these switches.
+    """Return the lines that replace the comment ``// #state NAME`` in the runtime of a solver.
 
-    ``name`` is NAME. Names that begin with ``lattice_`` are for solvers of lattices.
+    ``name`` is the word in the place of NAME. Names that begin with ``lattice_`` are for solvers of lattices.
     """
     records = LATTICE if name.startswith("lattice_") else SOLVER
     blocks = [block for block in records if not block.when or holds(block.when, switches)]
