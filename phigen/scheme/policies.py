@@ -196,7 +196,7 @@ class GaussAdjointPolicy(Policy):
     )
     adjoint_stalled: float = number(0.8, "above this ratio of successive changes, further sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "sweeps end after two changes that are below this, but above ADJOINT_STALLED times the previous change"
+        1e-12, "two changes below this, each above ADJOINT_STALLED times the previous one, end the sweeps"
     )
 
 
