@@ -35,7 +35,7 @@ COMMANDS = {
     "list": ("phigen.cli.list", "List the bundled specs."),
     "schema": ("phigen.cli.schema", "Print the JSON Schema of specs, for editors."),
     "reproduce": ("phigen.cli.reproduce", "Draw the figures of the paper and print the measured numbers."),
-    "demo": ("phigen.cli.demo", "Compile and run the paper's Lotka–Volterra system."),
+    "demo": ("phigen.cli.demo", "Compile a Lotka–Volterra system, run it and compare."),
 }
 
 
