@@ -85,7 +85,7 @@ TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
 _DEVICE = TARGETS["device"]
 
-#: The targets that are devices, by name. Devices run the files of the target named "device".
+#: The devices, by name: libraries for graphics cards. All devices run the files of the target "device".
 DEVICES: Mapping[str, Target] = {
     name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 6e11aa4bb284272f8b64e4e4337c1a27a591dfe59fe22d7ecafcdda32c3bd9a0
+ * body-sha256: 090f4ac6724f842547be4cc71666c6d9d42aedc5a32d2fa870e79658846405c2
  */
 #include "food_web.h"
 #include <limits.h>
@@ -183,7 +183,7 @@ static inline void food_web_gather1(const double *coef, const food_web_row *row,
     }
 }
 
-/* The flow of H_1 = sum of x - k*log(x): x scaled. */
+/* The flow of H_1 = sum(x - k*log(x)): x multiplied by a factor. */
 static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 {
     const double c0 = coef[0];
@@ -450,7 +450,7 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply flow `number` of step `steps`. Number food_web_FLOWS is flow 0 merged with the flow before. */
+/* Apply flow `number` of step `steps`. Number food_web_FLOWS is the last flow merged with flow 0. */
 static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 2e959abc1c4f55fce777dc22911edc03a5acd2aaed8a65349bb7f4b28a0270bf
+ * body-sha256: aa71e6efaacb43e929ce98be71a97f4b5d55a12c20f9ced9e7eaca943e132369
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -223,7 +223,7 @@ static inline double heisenberg_versin_near(double t)
         (-2.480158698886182e-05 + z * (2.755707789915398e-07 + z * -2.0790896078016366e-09)))));
 }
 
-/* The flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z rotated. */
+/* The flow of H_1 = sum(-(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1])))): y, z rotated. */
 static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -271,7 +271,7 @@ static inline void heisenberg_sweep1_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z rotated. */
+/* The flow of H_2 = sum(-(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1])))): x, z rotated. */
 static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -319,7 +319,7 @@ static inline void heisenberg_sweep2_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y rotated. */
+/* The flow of H_3 = sum(-(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1])))): x, y rotated. */
 static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 994debee77a70b61ca00efc5a3356091242682fe5e76496a673d230db6307812
+ * body-sha256: 91663502ad738182fac30282de1c690790ab151412c6a3d437226735b4bfcddf
  */
 #include "toda.h"
 #include <math.h>
@@ -157,7 +157,7 @@ static inline double toda_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* The flow of H_1 = sum of a**2: b shifted. */
+/* The flow of H_1 = sum(a**2): b shifted. */
 static inline void toda_sweep1(const double *coef, const toda_row *row)
 {
     const double c0 = coef[0];
@@ -170,7 +170,7 @@ static inline void toda_sweep1(const double *coef, const toda_row *row)
     }
 }
 
-/* The flow of H_2 = sum of 1/2*b**2: a scaled. */
+/* The flow of H_2 = sum(1/2*b**2): a multiplied by a factor. */
 static inline void toda_sweep2(const double *coef, const toda_row *row)
 {
     const double c1 = coef[1];
@@ -340,7 +340,7 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* ---- The flows ---- */
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flow `number` of step `steps`. Number toda_FLOWS is flow 0 merged with the flow before. */
+/* Apply flow `number` of step `steps`. Number toda_FLOWS is the last flow merged with flow 0. */
 static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;

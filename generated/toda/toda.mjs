@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b8a7342421af94fceed81ae72c0b66e8c3f3cbec14af9a1ff9ff346b45f5d593
+ * body-sha256: b1198b2c1d8ebd7e5e2a02cee8678856f9eba7870e6bea9af8fd819aa471bf0f
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -79,7 +79,7 @@ function prepare(params, h, coef) {
   coef[1] = h;
 }
 
-/** The flow of H_1 = sum of a**2: b shifted. */
+/** The flow of H_1 = sum(a**2): b shifted. */
 function sweep1(coef, x, sites) {
   const { count } = sites;
   const c_0 = coef[0];
@@ -92,7 +92,7 @@ function sweep1(coef, x, sites) {
   }
 }
 
-/** The flow of H_2 = sum of 1/2*b**2: a scaled. */
+/** The flow of H_2 = sum(1/2*b**2): a multiplied by a factor. */
 function sweep2(coef, x, sites) {
   const { count } = sites;
   const c_1 = coef[1];

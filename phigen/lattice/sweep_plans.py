@@ -152,7 +152,7 @@ class SplittingPlan:
         for flow, name in zip(self.noise, cell.noise, strict=True):
             yield flow, f"the noise {name}"
         for k, flow in enumerate(self.flows, 1):
-            part = self.bodies.named(flow) if self.bodies else f"sum of {flow.hamiltonian}"
+            part = self.bodies.named(flow) if self.bodies else f"sum({flow.hamiltonian})"
             yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = {part}"
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> None:

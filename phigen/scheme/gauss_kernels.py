@@ -45,7 +45,7 @@ def _field(points: StageMap, coefficients: Coefficients, *, collected: bool) -> 
 
 
 def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with the symbols of velocities replaced by the ``velocities``; products are not rearranged."""
+    """Return the expressions ``roots``, with the symbols of velocities replaced by the ``velocities``."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "symbol" and kind_of(e.value) == VELOCITY:

@@ -28,11 +28,11 @@ class PathAdjoint:
     """The kernels and recurrences that transpose a step along a path; the formulas are in
     `phigen.scheme.adjoint`.
 
-    ``recurrences`` follow the path backwards, together with cotangents. The last of these cotangents are those of the
-    coefficients that the path reads; ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and
-    its Hessian at the mean of the path. ``slope`` computes the cotangents of the coefficients of S_h from the cotangent
-    of p = ∇S_h. ``slopes`` are recurrences for the derivatives of a path with respect to its start, to p and to
-    coefficients. These recurrences are used where many paths are transposed at once.
+    ``recurrences`` compute the path backwards, the cotangents of its states, and the cotangents of the coefficients
+    that the path reads. ``used`` has the indices of these coefficients. ``curvature`` computes ∇S_h and its Hessian at
+    the mean of the path. ``slope`` computes the cotangents of the coefficients of S_h from the cotangent of p = ∇S_h.
+    ``slopes`` are recurrences for the derivatives of a path with respect to its start, to p and to coefficients. These
+    recurrences are used where many paths are transposed at once.
     """
 
     recurrences: Recurrences

@@ -53,7 +53,7 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution:
     w = [ring.monomial(m) for m in motion.basis]
     if len(w) == 1:
         growth = ring.expression(motion.matrix[0][0] * ring.tower.variable(TIME))
-        return Solution((ring.expression(w[0]) * call("expm1", growth),), "scaled")
+        return Solution((ring.expression(w[0]) * call("expm1", growth),), "multiplied by a factor")
     powers = _powers(ring, motion.matrix)
     images = [_image(ring, power, w) for power in powers]
     solution = _nilpotent(ring, powers, images)
@@ -106,7 +106,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
     if directed is not None:
         growth = call("expm1", exponent)
         if a == 1:
-            return Solution(tuple(growth * v for v in directed), "scaled")
+            return Solution(tuple(growth * v for v in directed), "multiplied by a factor")
         first = [ring.expression(v) for v in images[0]]
         return Solution(
             tuple(t * u + (growth - exponent) * v for u, v in zip(first, directed, strict=True)), "scaled and shifted"
@@ -114,7 +114,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
     if a == 2:
         return None
     growth = t * call("exprel", exponent)
-    return Solution(tuple(growth * ring.expression(v) for v in images[0]), "scaled")
+    return Solution(tuple(growth * ring.expression(v) for v in images[0]), "multiplied by a factor")
 
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:

@@ -124,7 +124,7 @@ def _merged_flows(flows: Sequence[Flow]) -> Flow:
 
 
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
-    """Yield the flows of the damping field λππb, where b is the part of ∇H in a block of π.
+    """Yield the flows of the damping field λππb. λ is the ``damping``, and b is ∇H with zeros outside the ``block``.
 
     b is divided into summands. The damping field of each summand must have a flow that phigen finds. Divisions into few
     summands are tried first.

@@ -538,9 +538,9 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """Return the check of the largest step size with which steps from all ``states`` succeed.
+    """Find the largest step size with which steps from all ``states`` succeed, and return it as a check.
 
-    The step size is in units of the step size of the run.
+    The check gives this step size as a multiple of the step size of the run, and fails below 1.
     """
     largest = measures.largest_step(subject.main, states, subject.h)
     return Check(

@@ -219,7 +219,7 @@ class Tower(Arithmetic[Poly]):
         try:
             return self.values(expressions)
         except _MissingError as missing:
-            raise ValueError(f"the ring has no generator for {missing.kind}") from None
+            raise ValueError(f"no polynomial represents the function {missing.kind} here") from None
 
     def function(self, name: str, args: list[Poly]) -> Poly:
         """Return the value of a function at elements, as an element of the ring: a generator, or an expression in

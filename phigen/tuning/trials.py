@@ -15,9 +15,9 @@ from phigen.tuning.timing import nanoseconds_per_step
 
 #: Approximate number of equidistant times at which an orbit is compared with the reference solution.
 MARKS = 256
-#: Bounds for the power p of errors that grow like t^p. If p exceeds LINEAR, the motion counts as chaotic. If p is below
-#: STEADY, the growth counts as linear, up to oscillations.
-LINEAR, STEADY = 1.8, 1.3
+#: Bounds for the power p of errors that grow like t^p. Above LARGEST_REGULAR_GROWTH, the motion counts as chaotic.
+#: Below LARGEST_LINEAR_GROWTH, the growth counts as linear: oscillations of the errors change the fitted p.
+LARGEST_REGULAR_GROWTH, LARGEST_LINEAR_GROWTH = 1.8, 1.3
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,9 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         rounding_unit = method.rounding
         largest = max(float(np.max(errors)), rounding_unit)
         growth, time = _growth(errors, rounding_unit), stride * count * h
-        power = 1.0 if math.isnan(growth) or (bounded and growth < STEADY) else min(max(growth, 1.0), 2.0)
+        power = (
+            1.0 if math.isnan(growth) or (bounded and growth < LARGEST_LINEAR_GROWTH) else min(max(growth, 1.0), 2.0)
+        )
         error = largest * math.pow(max(problem.horizon / time, 1.0), power)
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
         return Point(h, error, largest, time, cost, growth, unit=rounding_unit) if math.isfinite(cost) else None

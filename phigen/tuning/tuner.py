@@ -17,7 +17,7 @@ from phigen.tuning.references import Reference, agreed, orbit_error
 from phigen.tuning.scales import scales
 from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
-from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
+from phigen.tuning.trials import LARGEST_REGULAR_GROWTH, Measure, Point, energy_measure, marks, orbit_measure
 
 #: Shares of the time budget. SEARCHING: after this share no build starts. BUILDING: largest duration of one round of
 #: builds. SCANNING: largest duration of measuring one candidate with several steps. REFERRING: largest duration of
@@ -289,7 +289,7 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, s
     for _ in range(12):
         point = measure(method, h, span)
         if point and 1e-11 < point.measured < 1e-3:
-            if point.growth > LINEAR:
+            if point.growth > LARGEST_REGULAR_GROWTH:
                 raise CheckError(
                     f"the error of the orbit grows like {clock}^{point.growth:.1f}: the motion is chaotic, and what is "
                     f"measured over {clock} = 0 … {span:.6g} is no evidence for a longer run\n"

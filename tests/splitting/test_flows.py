@@ -57,7 +57,7 @@ SYSTEMS = {
     ),
     "a logarithm": (
         "coordinates: [x, y]\npoisson: {brackets: {x: {y: exp(2*x)*y}}}\nhamiltonian: y + x**2",
-        ["x moved by a logarithm", "y scaled"],
+        ["x moved by a logarithm", "y multiplied by a factor"],
     ),
     "a power": (
         "coordinates: [x, y]\npoisson: {brackets: {x: {y: x**3*y**2}}}\nhamiltonian: y + x",
@@ -89,7 +89,7 @@ SYSTEMS = {
     "scalings": (
         "coordinates: [x, y, z]\npoisson: {log_canonical: [[0, 1, 2], [-1, 0, -3], [-2, 3, 0]]}\n"
         "hamiltonian: x - log(x) + y**2 + exp(z)",
-        ["x, y scaled", "x, z scaled", "y, z scaled"],
+        ["x, y multiplied by a factor", "x, z multiplied by a factor", "y, z multiplied by a factor"],
     ),
     "affine": (
         "coordinates: [x, y]\nparameters: {b: 2}\npoisson: {brackets: {x: {y: x + b}}}\nhamiltonian: x**2 + y**2",

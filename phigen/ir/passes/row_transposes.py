@@ -64,13 +64,14 @@ class Handed:
 class Transpose:
     """A transposed function before the lowering, and the arrays that it reads and writes.
 
-    The function reads cotangents of the kind ``seed``. The tuple ``fields`` contains numbers of fields of the lattice;
-    the function reads the cotangents of these fields. If ``fields`` is empty, it reads the arrays ``varied`` of the row
-    record. Then the function adds contributions of other sites, which an earlier loop has stored; ``received`` lists
-    these contributions. The function also stores contributions to other sites, which ``handed`` lists. ``summed`` is
-    the number of sums over bonds or pairs that the function reads; the cotangents of these sums are stored in the
-    arrays from number ``sums_from`` on. The function also writes the fields of the lattice that are listed in
-    ``recomputed``.
+    - ``seed``: the kind of the symbols for the cotangents that the function reads
+    - ``fields``: the numbers of the fields of the lattice to which these cotangents belong; if there are none, the
+      function reads the arrays ``varied`` of the row
+    - ``received``: the contributions of other sites to these cotangents, which an earlier loop has stored
+    - ``handed``: the contributions to other sites, which the function stores
+    - ``summed``: the number of sums over bonds or pairs on which the results depend
+    - ``sums_from``: the number of the first array for the cotangents of these sums
+    - ``recomputed``: the names of the fields of the lattice that the function also writes
     """
 
     function: ir.Function

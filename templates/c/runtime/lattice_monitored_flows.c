@@ -5,7 +5,7 @@
 #include "lattice_monitor.c"
 #include "lattice_late_flows.c"
 
-/* Apply flow `number` of a step, the flow of a part of K. Number PHI_FLOWS is flow 0 merged with the flow before. If the
+/* Apply flow `number` of a step, the flow of a part of K. Number PHI_FLOWS is the last flow merged with flow 0. If the
    physical time would not increase, the state becomes NaN. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Apply flow `number` of step `steps`. Number PHI_FLOWS is flow 0 merged with the flow before. */
+/* Apply flow `number` of step `steps`. Number PHI_FLOWS is the last flow merged with flow 0. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_BODIES && !PHI_SHARED
