@@ -189,7 +189,7 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
 
 def test_long_stages_report_their_progress(monkeypatch):
     """Stages of the compiler that take long report progress, and their counts reach the announced totals."""
-    monkeypatch.setattr(expression, "MANY", 20)
+    monkeypatch.setattr(expression, "LARGE_GRAPH", 20)
     monkeypatch.setattr(sampled.limits, "PROOF_PRODUCTS", 0)
     stages = {}
     text = spec(names(4), "lie_algebra: {name: gl(2)}", "+".join(f"{i}*x{i}**2" for i in range(1, 5)))

@@ -128,7 +128,7 @@ def test_methods_for_test_particles_are_verified_with_their_gradients(tmp_path):
     path.write_text(PAIRS)
     result = CliRunner().invoke(group, ["verify", str(path), "--adjoint", "--quick", "--json"], prog_name="phigen")
     assert result.exit_code == 0, result.output
-    assert '"Poisson identity on 3 sites, m = 0.01 for 0"' in result.stdout
+    assert '"Poisson identity on 3 sites, m = 0.01 instead of 0"' in result.stdout
     assert '"gradient against differences on all sites"' in result.stdout
 
 
