@@ -50,8 +50,10 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """Return the statements on the brackets for a pull-back, in the coordinates y in which the spec states π. The
-    details of the statements name these coordinates.
+    """Return the statements on the brackets of the maps α and β of ``inner``.
+
+    ``inner`` is a system and its bi-realisation, in the coordinates in which the spec states π. The details of the
+    statements name these coordinates.
     """
     place = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]

@@ -30,7 +30,7 @@ def build(system: System, choice: BirealisationChoice, build_part: Builder) -> B
 
 
 def grouped(system: System) -> list[System]:
-    """Return a system with H = 0 for each block of π. The blocks with constant π form one system together."""
+    """Return the blocks of π as separate systems with H = 0. All blocks with constant π together form one system."""
     single = [block_of(system, indices) for indices in blocks(system.coordinates, system.poisson)]
     constant = [b for b in single if isinstance(b.shape, Constant | Canonical)]
     if len(constant) < 2:

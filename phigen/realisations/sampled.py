@@ -1,7 +1,7 @@
 """Check of the axioms of a large bi-realisation at points, in exact arithmetic.
 
-A proof would expand too many terms. At a point, the brackets of all pairs are products of two matrices of numbers: the
-derivatives with respect to x and those with respect to p.
+A proof would expand too many terms. At a point, the derivatives of α and β are matrices of numbers. Products of these
+matrices give the brackets of all pairs of components.
 """
 
 from __future__ import annotations

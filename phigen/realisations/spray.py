@@ -169,7 +169,10 @@ def _maps(system: System, displacement: Sequence[Expression]) -> tuple[tuple[Exp
 
 
 def moser_steps(spray: Spray, degree: int) -> list[Step]:
-    """Return the factors of ψ₀ that α needs up to a degree in p. ψ₀ is the map of Moser's trick, with ψ₀*Ω₀ = ω."""
+    """Return the factors of the map ψ₀ that are necessary to compute α up to ``degree`` in p.
+
+    The head of the file defines ψ₀ and α.
+    """
     return straighten(spray.space, centred_form(spray, degree + 1), degree + 1)
 
 

@@ -1,4 +1,4 @@
-"""Proofs of the axioms for α and β that are truncated series in p, one degree in p after another.
+"""Proofs of the axioms for maps α and β that are truncated series in p. Each degree in p is proved by itself.
 
 If α and β are correct up to degree d in p, their brackets are correct up to degree d − 1, since {·, ·} contains one
 derivative with respect to p. Let f^(k) be the part of degree k in p of a function f. The axiom for α is proved as
