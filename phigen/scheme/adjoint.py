@@ -178,8 +178,9 @@ def completed(
 
 
 def _unused_coefficients(kernels: Sequence[Kernel]) -> frozenset[int]:
-    """Return the indices of coefficients whose cotangents are 0 in all these transposed kernels. Coefficients of
-    attitudes are of this kind, since attitudes are not differentiated.
+    """Return the indices of the coefficients whose cotangents are 0 in each of the transposed ``kernels``.
+
+    Examples are the coefficients of attitudes, since attitudes are not differentiated.
     """
     rows = [o.values for kernel in kernels for o in kernel.outputs if o.name == f"{TABLE}_bar"]
     used = {k for values in rows for k, e in enumerate(values) if not e.is_zero}
@@ -222,7 +223,10 @@ def _constant_coefficients(coefficients: Coefficients, differentiated: Mapping[s
 
 
 def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
-    """Return a transposed kernel with the cotangents of the coefficients marked as ``constant`` replaced by 0."""
+    """Return a copy of a transposed kernel in which the cotangents of constant coefficients are 0.
+
+    ``constant`` says for each coefficient whether it is constant.
+    """
     outputs = [
         replace(o, values=tuple(ZERO if is_constant else e for e, is_constant in zip(o.values, constant, strict=True)))
         if o.name == f"{TABLE}_bar"

@@ -48,8 +48,10 @@ def expect_element(system: System, realisation: BiRealisation) -> None:
 def stage_attitude(
     system: System, group: Group, realisation: BiRealisation, generating: GeneratingFunction, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of an implicit step. The coefficients of its kernels are added to the table of
-    ``generating``."""
+    """Return the kernels for the attitude in an implicit step.
+
+    The coefficients of these kernels are added to ``generating.coefficients``.
+    """
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = (
         list(generating.turning),

@@ -16,11 +16,12 @@ ONE_END = "; only for bonds that"
 
 
 def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
-    """Return the loops over the bonds of a site, each with the parameters whose sign is opposite at the end b.
+    """Return the loops over the bonds of a site. Each loop comes with the set of the parameters that change their sign
+    at the end b.
 
-    Parameters of bonds may depend on the direction of a bond. If the contribution at the end b is proved to equal that
-    at the end a with some signs of parameters reversed, one loop is sufficient for both ends; otherwise each end has
-    its own loop.
+    Parameters of bonds may depend on the direction of a bond. Often the contributions at the ends a and b differ only
+    in the signs of some parameters. If this is proved, one loop is sufficient for both ends. Otherwise each end has its
+    own loop, and the sets are empty.
     """
     apart = [(e, frozenset[str]()) for e in gather.ends]
     if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:

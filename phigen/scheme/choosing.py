@@ -207,7 +207,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
-    """Return the exception for a near-integrable composition if H has no two parts, or no part known to be small."""
+    """Return the error which says that a near-integrable ``composition`` needs two parts of H, one of them small."""
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"this H has {count} part{'s' * (count > 1)}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"

@@ -35,7 +35,10 @@ class Collected:
         return [[v for v, row in enumerate(self.slopes) if row[j]] for j in range(len(self.slopes[0]))]
 
     def derivative(self, terms: Terms, j: int) -> Terms:
-        """Return the total derivative of a collected polynomial with respect to coordinate number j."""
+        """Return the derivative of a collected polynomial with respect to coordinate number j.
+
+        The variables of the polynomial are functions of the coordinates, so the chain rule applies.
+        """
         result: dict[Monomial, Expression] = {}
         moving = self._moving[j]
         for m, c in terms.items():

@@ -33,7 +33,8 @@ NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 NEWTON_ENTRY = 8.0
 #: Nanoseconds of a Gauss step with eight stages in SIMD lanes, summed over all sweeps: for each arithmetic operation in
 #: the vector field, for each elementary function in the vector field, for all other work of a step, and for the change
-#: to the frame of the next step. With up to four stages, operations and elementary functions take half of the time.
+#: to the frame of the next step. With at most four stages, each operation and each elementary function takes half as
+#: long.
 STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
 #: Time of a division, in units of an addition.
 DIVISION = 4
@@ -81,7 +82,9 @@ def _steps(program: Program) -> Mapping[int, float]:
 
 
 def _operations(program: Program) -> tuple[int, int]:
-    """Return the number of arithmetic operations of a step, in units of an addition, and that of function calls."""
+    """Return two numbers for a step: the cost of its arithmetic operations in units of an addition, and the number of
+    its function calls.
+    """
     return _counted(program.about.operations)
 
 

@@ -110,8 +110,9 @@ class Gauge:
     def applied(self, system: System) -> System:
         """Return the system that is discretised.
 
-        Its H is H − Σ λ_c C_c or, with a monitor g, g(H + e) − Σ λ_c C_c. With a monitor g and forces, H remains, and
-        the vector force f is replaced by gf. In this case the covector of a step is later derived from H.
+        Its Hamiltonian is H − Σ λ_c C_c or, with a monitor g, g(H + e) − Σ λ_c C_c. If there are a monitor g and
+        forces, its Hamiltonian is H, and its vector force is gf in place of f. In this case `pace` returns the factor
+        by which ∇H is multiplied.
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)

@@ -147,9 +147,11 @@ def graph_form(
 def forced_form(
     system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return p = τg(∇H + ζ) and its derivatives, in place of ∇S_h, for a system with the monitor g and forces.
+    """Return the covector p = τg(∇H + ζ) and its derivatives, for a system with a monitor g and forces. The step uses p
+    in place of ∇S_h.
 
-    τ is the step size in the time of the monitor. p is not a gradient, and does not depend on the energy level e.
+    τ is the step size in the time of the monitor, and ζ is the covector force. p is not a gradient, and does not depend
+    on the energy level e.
     """
     assert system.forces is not None
     rate = symbol(STEP) * monitor

@@ -65,7 +65,7 @@ class Logarithmic:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
-        """Return the record of the monitor for the program, with dt/dτ = 1/(−B), where B is the negative part of H."""
+        """Return the record of the monitor for the program. The rate is dt/dτ = 1/(−B), where H = A + B and B < 0."""
         return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
 
     def _is_negative(self, flow: Flow) -> bool:

@@ -94,7 +94,10 @@ class Corrected(NearIntegrable):
     multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, and the flows at the start and the end of a run. Part 0 is B, part 1 is A."""
+        """Return the flows of a step, and the flows at the start and the end of a run.
+
+        In H = A + εB, part number 0 is εB, and part number 1 is A.
+        """
         flows = schedule(self.corrector)
         if not self.multiple:
             return flows

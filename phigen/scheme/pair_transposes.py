@@ -51,9 +51,11 @@ def transposed_at_ends(
 
 
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
-    """Return a transposed kernel with 0 in place of the cotangents that do not belong to the site at ``end``.
+    """Return a copy of a transposed kernel for one ``end`` of a bond or pair, "a" or "b". The cotangents of the site at
+    the opposite end are replaced by 0.
 
-    Other cotangents, such as those of parameters of bonds, are computed only for the end b.
+    Some cotangents belong to neither end, such as those of parameters of bonds. The copy for the end b computes them,
+    and the copy for the end a has 0 in their place.
     """
     outputs = []
     for o in kernel.outputs:

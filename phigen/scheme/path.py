@@ -210,7 +210,7 @@ class _PathBuilder:
         return self._series_of[id(e)]
 
     def _value(self, e: Expression) -> Expression:
-        """Return the value of a node at order 0 of its series: the symbol ``s:i`` or ``f:i``, or a number."""
+        """Return the value of a node at order 0 of its series: a symbol or a number."""
         if id(e) in self._series_of:
             return symbol(Symbol(SERIES, self._series_of[id(e)]))
         if not e.args:

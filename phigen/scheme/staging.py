@@ -82,7 +82,9 @@ class Coefficients:
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """For each matrix tA the place of its first entry in the table, and its number of rows."""
+        """Two numbers for each matrix tA: the index of its first entry in the table of coefficients, and its number of
+        rows.
+        """
         blocks, start = [], len(self.values)
         for exponential in self.exponentials:
             blocks.append((start, exponential.size))
@@ -133,8 +135,11 @@ class Coefficients:
         return [self._written_out(e) for e in roots]
 
     def slot(self, e: Expression) -> Expression:
-        """Return the coefficient for a state-independent expression, which is added to the table; a number is returned
-        unchanged."""
+        """Return the symbol of the coefficient that stands for an expression. A missing coefficient is added to the
+        table.
+
+        The expression must not depend on the state. If it is a number, the number itself is returned.
+        """
         if e.is_number:
             return e
         name = self._index.get(id(e))
@@ -209,7 +214,7 @@ def _expressions(tree: Any) -> Iterable[Expression]:
 
 
 def _rebuilt(tree: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
-    """Return a copy of nested tuples and dataclasses in which other expressions take the place of those inside.
+    """Return a copy of nested tuples and dataclasses in which each expression is replaced.
 
     ``renamed`` maps the ``id`` of an old expression to the new one. Kernels that read the table of coefficients receive
     all of its ``slots`` as input.

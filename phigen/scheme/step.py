@@ -91,7 +91,10 @@ def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[Spars
 
 
 def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
-    """Return a row of the matrix ∂_x + ∂_p · Hess S_h, from a row of ∂_x (``x_part``) and a row of ∂_p (``p_part``)."""
+    """Return a row of ∂_x f + ∂_p f · Hess S_h, the derivative of a map f(x, ∇S_h(x)).
+
+    ``x_part`` is the same row of ∂_x f, and ``p_part`` is the same row of ∂_p f.
+    """
     n = len(hessian)
     products: list[SparseRow] = [{} for _ in range(n)]
     for k, e in p_part.items():

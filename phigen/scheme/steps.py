@@ -422,8 +422,8 @@ class Gauss(_Staged):
     weights of the method, and μ_ij = a_ij/b_j follows from its matrix a_ij. Then x' = x + D(x, Σ_j L_j). The unknowns Z
     are offsets from the start of the step, where they are 0. ``slope`` is f; its input x is the start of the step,
     followed by the time if f depends on the time. ``change`` is D. ``frame`` transforms the L_j to the frame of the
-    next step, if that frame differs. The first ``plain`` unknowns have the scale of the state. All further unknowns are
-    increments of logarithms or of group elements, and have the scale 1.
+    next step, if that frame differs. ``plain`` is the number of unknowns that have the scale of the state; these
+    unknowns come first. All further unknowns are increments of logarithms or of group elements, and have the scale 1.
 
     ``lifted`` is the same step with the unknowns U = FG in place of the group elements G. The frame F is the value of U
     at the start of the step. The field ``lift`` of the step ``lifted`` describes the frames. ``lifted`` is None if some
@@ -484,7 +484,9 @@ class _Scheduled(_Staged):
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one step. The table of coefficients has a row for each duration of a flow."""
+        """The number of coefficients in the table of one step. The table has one row for each duration in the
+        schedule.
+        """
         return self.row * len(self.schedule.times)
 
 
@@ -579,8 +581,8 @@ class Ends:
     selects the bonds that begin at the site of the loop ("a"), the bonds that end at this site ("b"), or all bonds of
     the site (""). ``chosen`` says which site must have the colour of the sweep: ``here`` (the site of the loop),
     ``there`` (the other site), or "" for neither. ``extremes`` maps the index of an output to ``max`` or ``min``, if
-    this output is reduced in this way; all other outputs are summed. For pairs, the other sites are those from number
-    ``first`` on. If the kernel is ``massive``, the sites after the last one with a nonzero mass are omitted, since they
+    this output is reduced in this way; all other outputs are summed. For pairs, the other sites begin with number
+    ``first``. If ``massive`` is true, the other sites end with the last site of nonzero mass, since sites without mass
     contribute nothing.
     """
 
@@ -746,8 +748,8 @@ class Sweeps(_Scheduled):
     flows in the middle, 2 for the last flow, and 3 for the flows in the middle in reverse order. If H depends on the
     time, the advance of the time is the last flow, and the flow of the last part is one in the middle.
 
-    If bodies have ``relative`` coordinates, the fields are transformed to these coordinates before the flows, and back
-    after them.
+    On a lattice of attracting bodies, ``relative`` may describe relative coordinates. Then the fields are transformed
+    to these coordinates before the flows, and back after the flows.
     """
 
     sites: Sites
@@ -823,7 +825,7 @@ class Sweeps(_Scheduled):
 
     @property
     def rate_kernels(self) -> tuple[Kernel, ...]:
-        """The kernels for the monitor ``log``, which compute the energies of A and B; empty without this monitor."""
+        """The kernels that the monitor ``log`` needs; empty without this monitor."""
         return self.rates.kernels if self.rates else ()
 
     @property
