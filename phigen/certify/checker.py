@@ -151,10 +151,11 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # "rest" adds an error for the terms that the C leaves out of a Taylor series. The C adds all terms before
-            # a[3], perhaps some of the terms a[3:], and no later terms. The sum of all terms from a[3] on is at most
-            # ``tail``, by Lagrange's form of the remainder. The sum of those that the C adds is at most Σ |a[3:]|. In
-            # the mean of a path, each term has a divisor of at least a[2]; otherwise a[2] is 1. The factors 3 and 2
+            # "rest" adds an error for the terms that the C leaves out of a Taylor series. The operand a[0] is the sum
+            # of the terms that the C always adds. The operands a[3:] are the next terms of the series: the C may add
+            # some of them, and adds no later terms. The sum of the terms a[3:] and all later terms is at most ``tail``,
+            # by Lagrange's form of the remainder. The sum of those that the C adds is at most Σ |a[3:]|. In the mean of
+            # a path, each of these terms has a divisor of at least a[2]; otherwise a[2] is 1. The factors 3 and 2
             # enlarge the bound, so that it also covers derivatives of the series.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]

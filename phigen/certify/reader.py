@@ -188,7 +188,7 @@ class PathReader(KernelReader):
 
     @property
     def described(self) -> dict[str, Any]:
-        """The operations and coefficients of the series, in the format of certificates."""
+        """The operations and the Taylor coefficients of a path, in the format of certificates."""
         outputs = {name: list(self.outputs[name].values()) for name in self._known}
         return {"operations": self.operations, "outputs": outputs}
 

@@ -55,7 +55,9 @@ class Listing:
         return [self.input(name, i) for i in range(count)]
 
     def sum(self, terms: Sequence[int]) -> int:
-        """Append the additions of some terms, in their order, and return the index of the sum."""
+        """Append operations that add the values with the indices ``terms``, in this order. Return the index of
+        the sum.
+        """
         total = terms[0]
         for term in terms[1:]:
             total = self.add("add", total, term)
@@ -266,9 +268,9 @@ MARGIN = 4.0
 def _path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step along paths, which the C expands in Taylor series.
+    """Return the stages of a step that follows paths. The C computes each path by a Taylor series.
 
-    The unknowns are p = ∇S_h at the mean of the path, where S_h is the generating function.
+    The unknowns of a stage are p = ∇S_h at the mean of its path, where S_h is the generating function.
     """
     limit = int(facts["most_terms"])
     longest, stages = PathReader(source, facts["series"], n, limit).described, []
