@@ -55,7 +55,7 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the index of the part B of H = A + B that is negative, since the monitor contains log(−B).
+    """Return the index of the negative part B of H = A + B. The monitor contains log(−B).
 
     A part that is negative at all states is preferred. If there is none, a part that is negative at the initial states
     of all runs is returned. Raises `SpecError` unless there are two parts, one of them negative.

@@ -171,7 +171,7 @@ def casimir_rate(cell: Cell, name: str) -> Expression:
 
 
 def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
-    """Return the names of the Casimirs that vector forces change."""
+    """Return the names of the Casimirs that the vector force f does not preserve."""
     return tuple(name for name in cell.casimirs if not casimir_rate(cell, name).is_zero)
 
 

@@ -167,9 +167,9 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
     """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    In democratic heliocentric coordinates, the remainder of H moves all positions with the velocity Σ m_j V_j/m_0,
-    where body j has the mass m_j and the relative velocity V_j. In these coordinates, sweeps that compute sums over
-    pairs also compute this velocity.
+    In democratic heliocentric coordinates, one part of H moves all positions with the velocity Σ m_j V_j/m_0. Here m_j
+    is the mass of body j, and V_j its relative velocity. The sweeps that compute sums over pairs also compute this
+    velocity.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 

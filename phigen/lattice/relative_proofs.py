@@ -176,7 +176,8 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the sums over bodies in the equations of motion of body ``i`` with the Hamiltonian B = H − A.
+        """Return the sums over bodies in the equations of motion of body ``i`` with the Hamiltonian
+        `remainder`.
 
         The result maps the symbol of each sum to its expression.
         """

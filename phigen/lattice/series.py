@@ -1,8 +1,8 @@
 """Steps of a lattice by the first term S_h = hH of the Hamilton–Jacobi series.
 
-A step is a composition of stages. A stage is the implicit step of order 2 that a bi-realisation (α, β) gives. It solves
-y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then it adds (β − α)(y, h∇H(y)) to x. At each site, α − x and β −
-α are formulas in the values at the site and around it.
+A step is a composition of stages. A stage is the implicit step of order 2 that a bi-realisation (α, β) gives. With p =
+h∇H(y), the stage solves α(y, p) = x for y on the whole lattice. Its result is β(y, p). At each site, α and β are
+formulas in the values at the site and around it.
 """
 
 from __future__ import annotations

@@ -293,7 +293,9 @@ class PartSearch:
             self._couples.setdefault(f, []).append(self.cell.place(other))
 
     def splitting(self) -> CellSplitting:
-        """Return H as a sum of parts with this colouring. Raises `NoPartError` if a term of H cannot be in any part."""
+        """Return the splitting of H that belongs to ``self.colouring``. Raises `NoPartError` if a term of H cannot be
+        in any part.
+        """
         site_terms: list[Summand] = []
         classes: list[tuple[Summand, int]] = []
         for term in summands_of(self.cell):

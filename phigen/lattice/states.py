@@ -102,7 +102,7 @@ class _Reader:
         if values.size and p.refuses(float(np.min(values))):
             raise self._out_of_bound(p, values, f"the parameter is {p.bound} by declaration")
         if self.spec.coordinates_from and p.at == "sites":
-            # The mass is the only parameter at sites, since `relative_bodies` refuses all other Hamiltonians.
+            # This parameter is the mass, since `relative_bodies` refuses other parameters at sites.
             self._expect_masses(p, values)
 
     def _expect_masses(self, p: Parameter, values: Floats) -> None:
