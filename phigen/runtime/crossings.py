@@ -68,7 +68,8 @@ class Section:
         return f"<Section of ({', '.join(self.coordinates)}): {len(self)} crossings>"
 
     def save(self, path: str | Path) -> None:
-        """Write the columns ``t,x1,…`` to a ``.csv`` file, or the arrays t, x and coordinates to a ``.npz``.
+        """Write the columns ``t,x1,…`` to a ``.csv`` file, or the arrays ``t``, ``x`` and ``coordinates`` to a ``.npz``
+        file.
 
         Raises `ValueError` for other suffixes.
         """
@@ -200,8 +201,9 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings (t, x) in the latest block of steps. Its first ``searched`` intervals are left out, since
-        they were searched before.
+        """Yield the crossings (t, x) that were not found in earlier blocks of steps.
+
+        The argument ``searched`` is the number of intervals at the start of ``values`` that belong to an earlier block.
         """
         self.places = []
         for sign in SIGNS[self.direction]:
@@ -248,9 +250,10 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Return the fraction of interval j at which sign·g is smallest, by a golden-section search.
+        """Return the fraction of interval ``j`` at which sign·g is smallest, by a golden-section search.
 
-        If the search meets a fraction at which g and v[j] have different signs, it returns this fraction at once.
+        The number ``v[j]`` is the value of g at the start of the interval. The search ends early at a fraction where g
+        has another sign.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN

@@ -61,11 +61,11 @@ def march(
     """Advance a session until it has made ``steps`` steps of size h. Yield every ``stride``-th state and the last, in
     pieces.
 
-    The length of a piece depends on the speed of the machine; the rows do not, since pieces do not divide the calls of
-    `_call_end`. ``is_started`` is true if the initial
-    state was yielded before. ``goes_on`` is true if a shorter step will follow. Then the state after the last whole
-    step is yielded only if it is a ``stride``-th state. ``see_tangent`` receives the derivative (DIM, DIM) of each
-    step. If a step fails, `BackendError` is raised after a piece that ends with the state before that step.
+    The length of a piece depends on the speed of the machine. The rows do not depend on the speed: `_call_end` chooses
+    the ends of calls by step numbers alone. ``is_started`` is true if the initial state was yielded before. ``goes_on``
+    is true if a shorter step will follow. Then the state after the last whole step is yielded only if it is a
+    ``stride``-th state. ``see_tangent`` receives the derivative (DIM, DIM) of each step. If a step fails,
+    `BackendError` is raised after a piece that ends with the state before that step.
     """
     size = 1
     if not is_started:

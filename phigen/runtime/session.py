@@ -54,7 +54,10 @@ class Followed(Course, Protocol):
         ...
 
     def element(self) -> Floats:
-        """Return a copy of the numbers of attitude and position; empty if the spec reconstructs neither."""
+        """Return a copy of the components of the reconstructed attitude and position.
+
+        The array is empty if the spec reconstructs neither.
+        """
         ...
 
 

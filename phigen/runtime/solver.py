@@ -511,8 +511,8 @@ class Solver(Named[Backend, Interface]):
         to each parameter.
 
         The derivative with respect to x0 is (DIM, DIM), with row i for coordinate i. The derivatives with respect to
-        parameters are (DIM,), by name. One `pullback` is made for each coordinate, with the same conventions and
-        errors.
+        parameters are (DIM,), by name. The method calls `pullback` once for each coordinate; see there for the
+        arguments and the errors.
         """
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         for name, value in arguments.together(parameters, by_keyword).items():

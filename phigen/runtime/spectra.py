@@ -162,9 +162,9 @@ def correlation(
 ) -> Floats:
     """Return the correlations ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites along an axis, (up_to + 1,).
 
-    f is the coordinate ``of``, g the coordinate ``other``. ⟨ ⟩ is the mean over the sites r, and over the frames from
-    the time ``after`` on. If the axis is open, ⟨f(r) g(r + d)⟩ is only over the sites r for which r + d is on the
-    lattice. Raises `ValueError` for lattices that are not grids, and for unknown coordinates or axes.
+    The arguments ``of`` and ``other`` are the names of the coordinates f and g. ⟨ ⟩ is the mean over the sites r, and
+    over the frames from the time ``after`` on. If the axis is open, ⟨f(r) g(r + d)⟩ is only over the sites r for which
+    r + d is on the lattice. Raises `ValueError` for lattices that are not grids, and for unknown coordinates or axes.
     """
     _expect_grid(run, "a correlation")
     if axis not in run.axes:

@@ -133,10 +133,10 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._tell_time()
 
     def _flows(self) -> list[tuple[int, int, int]]:
-        """Return the flows of a step in order, as triples: part of H, colour of the sites, and row of the
-        coefficients.
+        """Return the flows of a step in order, as triples (part, colour, row).
 
-        The colour is 0 for lattices that are not graphs.
+        ``part`` is the number of a part of H, and ``colour`` a colour of sites. ``row`` is the index of the
+        coefficients of the flow. The colour is 0 for lattices that are not graphs.
         """
         if hasattr(self._module, "BY_COLOUR"):
             return [(part, colour, row) for (part, colour), row in self._sites.schedule]

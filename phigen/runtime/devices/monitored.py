@@ -60,7 +60,7 @@ class MonitoredSession(DeviceLatticeSession):
             self.steps += 1
 
     def _advance_once(self) -> None:
-        """Make one step. If it fails, raises `BackendError`, and the state before the step is restored."""
+        """Make one step. If the step fails, restore the state before the step, and raise `BackendError`."""
         self._upload()
         self._launcher.copy(self._fields, self._before, self._stored)
         start_clock = self._sites.clock

@@ -1,4 +1,4 @@
-"""Tables of sites: arrays on a device with neighbours, bonds, parameters at sites, and selections of sites."""
+"""Tables of sites, stored on a device: arrays of neighbours, bonds, parameters at sites, and selected sites."""
 
 from __future__ import annotations
 
