@@ -91,7 +91,7 @@ class _ModifiedRecursion:
         self.fraction = self.tower.names.index(FRACTION)
 
     def advance(self, r: int, *, vanishing: bool) -> None:
-        """Compute H_{r−1} in the modified Hamiltonian Σ h^j H_j, and s_r in its generating function Σ h^r s_r(σ).
+        """Compute H_{r−1} and s_r, which the docstring of the module defines.
 
         ``vanishing`` says that H_{r−1} is 0 by symmetry.
         """
