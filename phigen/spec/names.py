@@ -52,7 +52,7 @@ MEANT = {
     "method": "scheme", "integrator": "scheme",
 }  # fmt: skip
 
-#: Words of other programs, with the words that specs have instead as values.
+#: Words that users of other programs may write as a value, with the value that specs have instead.
 MEANT_WORDS = {
     "python": "numpy", "javascript": "js", "JavaScript": "js", "cuda": "device", "opencl": "device", "gpu": "device",
     "single": "float", "float32": "float", "float64": "double", "misra": "certified",
@@ -61,7 +61,7 @@ MEANT_WORDS = {
     "up": "rising", "down": "falling", "increasing": "rising", "decreasing": "falling",
 }  # fmt: skip
 
-#: Hints for words under ``targets`` that phigen writes in other ways.
+#: Languages and formats that are not allowed under ``targets`` → hint: the option of ``phigen build`` that writes them.
 OTHER_TARGETS = {
     **dict.fromkeys(
         ("cpp", "c++", "C++", "fortran", "Fortran", "julia", "Julia", "matlab", "MATLAB", "rust", "Rust"),

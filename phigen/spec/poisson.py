@@ -1,7 +1,7 @@
 """Reader of ``poisson:``. It converts the YAML nodes of a Poisson structure to a form, which is a record of
 `model.py`.
 
-Sizes of matrices, names and repetitions are checked here; the Jacobi identity is checked later.
+The reader checks names, repetitions, and the sizes of matrices. The Jacobi identity is checked later.
 """
 
 # `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.

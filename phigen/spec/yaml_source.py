@@ -42,8 +42,8 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """Return the place in the file of character number ``index`` of the text. If this place is unknown, return the
-        place of the scalar.
+        """Return the place of the character ``text[index]`` in the file. If this place is unknown, return the place of
+        the scalar.
         """
         here = self.location
         if self.offset is not None:

@@ -139,7 +139,7 @@ class _Writer:
 
 
 def _size(written: str) -> int:
-    """Return the number of numbers, names and operators in an expression, as the limit of the parser counts them."""
+    """Return the size of an expression: how many numbers, names and operators it has. `_NODES` limits this size."""
     return len(re.findall(r"[\w.]+|\*\*|[-+*/]", written))
 
 
