@@ -50,9 +50,9 @@ MOST_PIECES = 4
 class Turning:
     """A part of H as a sum of functions whose flows have known group elements.
 
-    The summands are ``casimir``, a multiple of a Casimir, the ``terms``, and the energies of free rigid ``bodies``. The
-    group element of the part is the product of the group elements of its summands. If ``put_back`` is set, the rotation
-    by the Casimir is applied once in a step, not in each flow.
+    The summands are a multiple of a Casimir (``casimir``), other functions (``terms``), and the energies of free rigid
+    bodies (``bodies``). The group element of the part is the product of the group elements of all summands. If the flag
+    ``put_back`` is set, the factor for ``casimir`` is applied once in a step, else in each flow.
     """
 
     casimir: Expression
@@ -70,9 +70,7 @@ class Turning:
 
     @property
     def left(self) -> Expression:
-        """The summand ``casimir`` if ``put_back`` is set, else 0. The rotation by this summand is applied once in a
-        step.
-        """
+        """The summand whose group element is applied once in a step: ``casimir``, or 0 without ``put_back``."""
         return self.casimir if self.put_back else ZERO
 
 

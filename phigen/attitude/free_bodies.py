@@ -113,7 +113,7 @@ class _SortedAxes:
 
     @property
     def n(self) -> Expression:
-        """The parameter n = β_m c ≤ 0 of the elliptic integral of the third kind."""
+        """The parameter n = β_m c ≤ 0 of the elliptic integral of the third kind; see the head of the file."""
         return self.betas[1] * self.c
 
     @property
@@ -141,8 +141,8 @@ def identities() -> Iterator[tuple[str, Expression]]:
     """Yield pairs of a label and an expression. If all expressions are 0, the formulas at the head of the file are
     correct.
 
-    The expressions contain the formula for the momentum x' after the flow, which `phigen.splitting.euler` proves. They
-    contain CD as the time derivative of S (see `phigen.symbolic.elliptic`).
+    Two other formulas are assumed: the formula for the momentum x' after the flow, which `phigen.splitting.euler`
+    proves, and dS/dt = CD (see `phigen.symbolic.elliptic`).
     """
     yield from _shortest_rotation()
     for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of one of these

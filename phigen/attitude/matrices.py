@@ -21,8 +21,9 @@ from phigen.attitude.group import Dense, Group
 from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, total
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Degree of the series of exp that double precision requires if all eigenvalues of P have at most the modulus 1/2.
-TERMS = 14
+#: Degree of the Taylor polynomial that replaces exp(P) for a matrix P. The polynomial is accurate to double precision
+#: if all eigenvalues λ of P have |λ| ≤ 1/2.
+EXPONENTIAL_DEGREE = 14
 
 _HALF = number(Fraction(1, 2))
 
@@ -49,7 +50,7 @@ def exponential(group: Group, p: Sequence[Expression]) -> Flat:
     last = [e if (rows - j) % 2 else -ONE * e for j, e in enumerate(reversed(recurrence))]
     factors = [number(Fraction(1, factorial(j))) if j else ZERO for j in range(rows)]
     power = [ZERO] * (rows - 1) + [ONE]
-    for k in range(rows, TERMS + 1):
+    for k in range(rows, EXPONENTIAL_DEGREE + 1):
         power = [a + power[-1] * b for a, b in zip([ZERO, *power[:-1]], last, strict=True)]
         factors = [f + number(Fraction(1, factorial(k))) * a for f, a in zip(factors, power, strict=True)]
     return _combined(factors, powers)
