@@ -153,7 +153,7 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
         eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices of trace 0
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): S has the matrices of trace 0 that the involution leaves unchanged (skew-Hamiltonian matrices)
+        # sp(2n): skew-Hamiltonian matrices of trace 0
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:
@@ -210,7 +210,7 @@ class _Module:
 
     @property
     def size(self) -> int:
-        """The dimension of the star algebra A = K ⊕ g ⊕ S ⊕ Z."""
+        """The dimension of the star algebra A that the head of the file defines."""
         return 1 + len(self.ad) + len(self.tensors) + self.central
 
     def products(self) -> list[fmpq_mat] | None:

@@ -87,7 +87,9 @@ class StageMap:
 
 
 def _moves(system: System, i: int) -> bool:
-    """Whether brackets or a vector force may change a coordinate."""
+    """Whether coordinate ``i`` may change. With ẋ = π(∇H + ζ) + f, the coordinate is constant if f_i = 0 and π_ij = 0
+    for all j.
+    """
     pushed = system.forces is not None and not system.forces.vector[i].is_zero
     return pushed or any(not e.is_zero for e in system.poisson[i])
 
@@ -125,7 +127,7 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
 
 
 def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tuple[int, ...], ...], int]:
-    """Return the indices of the unknowns of each group, and the number of all unknowns.
+    """Return the field ``places`` of the `StageMap`, and the number of all unknowns.
 
     ``plain`` is the number of unknowns for coordinates and the time, and ``scaled`` the number of unknowns for
     logarithms.
@@ -231,7 +233,7 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
     A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and the basis E_a of the Lie algebra. For
     G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, there is a functional λ =
     x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. If there is a frame
-    F, the change is that of the quadratic form k̃(U E_a U*) with U = FG (`phigen.gauss.lift`).
+    F, the change is k̃(U E_a U*) − k̃(F E_a F*) with U = FG; `phigen.gauss.lift` defines the functional k̃.
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
@@ -436,9 +438,9 @@ def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence
 
 
 def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Expression]) -> list[Expression]:
-    """Return f(ab) for a functional f, an element a, and the basis elements b of the subalgebra outside the ideal.
+    """Return f(ab) for each basis element b that is not in the square-zero ideal.
 
-    ``left`` has the values of f at all basis elements of the star algebra.
+    ``a`` is an element of the star algebra, and ``left`` has the values of a functional f at all basis elements.
     """
     n = range(group.algebra.dimension)
     rows = [[_combined(group.algebra, group.algebra.table.get((i, k), {}), left) for i in n] for k in group.subalgebra]
@@ -541,7 +543,8 @@ def _functional_in_next_frame(
     At the end of the present step the group element is G = g + n, with g in the subalgebra and n in the ideal. ``k`` is
     the derivative of λ in the present step, and ``element_rate`` the derivative ġ in the frame of the next step. The
     result has the entry k(bg*) − λ(sg*) for each basis element b of the subalgebra, where s is the symmetric part of
-    ġb. The second term is subtracted since the functional of the next step is 0 at s.
+    ġb. The first term contains the contribution λ(sg*) of s. In the next step this contribution is 0, since x̃ vanishes
+    on symmetric elements.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

@@ -155,9 +155,8 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
 
 def _functionals(system: System, points: StageMap) -> Statement:
     """Decide whether two choices of unknowns give the same step: all components of group elements, or functionals λ in
-    place of some components.
+    place of some components (see `phigen.gauss.square_zero`).
 
-    With functionals and without them, the changes of coordinates must be equal, and the velocities must be equal.
     Symbols stand for ∇H, so that the statement holds for any H.
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
@@ -167,10 +166,9 @@ def _functionals(system: System, points: StageMap) -> Statement:
 
 
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
-    """Decide whether two choices of unknowns give the same step: U − F with U = FG, and G − 1.
+    """Decide whether the unknowns U − F with U = FG give the same step as the unknowns G − 1.
 
-    G is a group element. F is the frame at the start of the step, which satisfies x̃(q) = k̃(FqF*) (see
-    `phigen.gauss.lift`).
+    G is a group element, and F is the frame at the start of the step (see `phigen.gauss.lift`).
     """
     others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
     values = {name: symbol(name) for name in others}
