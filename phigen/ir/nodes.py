@@ -122,7 +122,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Name:
-    """Variable of the function, given by its symbol."""
+    """A variable of a function. Its symbol identifies the variable."""
 
     symbol: str
 
@@ -218,7 +218,7 @@ class OnSeam:
 
 @dataclass(frozen=True)
 class Member:
-    """Member of a record, such as the solver."""
+    """Member of a record; for example, an array of the solver."""
 
     record: Value
     name: str

@@ -122,15 +122,15 @@ class PathFunctions:
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
     def field(self) -> ir.Block:
-        """Return the statements that compute ṁ at a point from the values of the nodes in the array ``e``."""
+        """Return the statements that copy ṁ at a point from the array ``e``. The array has the values of all nodes."""
         derivatives = (ir.entry(E, index) for index in self.path.slopes)
         return tuple(ir.Assign(ir.entry(FIELD, i), value) for i, value in enumerate(derivatives))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
         """Return the declarations of the symbols in expressions.
 
-        The value of a series is its coefficient of order 0. With ``at_point``, it is an entry of the array ``e``, which
-        has the values of the nodes at a point.
+        A symbol may stand for a node of the expression graph. Without ``at_point``, its value is the Taylor coefficient
+        of order 0 of the node. With ``at_point``, its value is the entry of the array ``e`` for the node.
         """
         used = {*symbols_of(*expressions)}
         listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
@@ -391,8 +391,8 @@ def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
 
 
 def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
-    """Yield loops over all lanes that together contain ``statements``. Each loop has at most `LONGEST_LOOP`
-    statements.
+    """Divide ``statements`` into pieces of at most `LONGEST_LOOP` statements, and yield a loop over all lanes for each
+    piece.
     """
     for start in range(0, len(statements), LONGEST_LOOP):
         yield _lanes(statements[start : start + LONGEST_LOOP])

@@ -61,7 +61,7 @@ class RowLayout:
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
         """Return the address of row number ``line`` in an array.
 
-        ``rows`` is the name of the member of the row record that has the offsets of the rows in memory.
+        A member of the row record has the offsets of the rows in memory; ``rows`` is the name of this member.
         """
         return arrays if self.single_row else ir.Binary("+", arrays, ir.entry(ir.Member(ROW, rows), line))
 

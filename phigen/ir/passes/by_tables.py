@@ -15,7 +15,7 @@ the following members of this record:
 - ``sums``: a single array: the first sum over bonds or pairs at all sites, then the second sum at all sites, …
 - ``dw``: a single array: the increments of the first source of noise at all sites, then those of the second source, …
 - an array for each derived value, under its own name; parameters determine these values
-- ``massive``: for sums over pairs, the number of the first site after the last site that has a mass
+- ``massive``: for sums over pairs, the number of sites up to and including the last site with a mass
 
 The runtime also defines the methods ``bonds`` and ``begins`` of ``sites``, and the functions ``fill``, ``placed`` and
 ``joinSums``. ``templates/js/runtime/sites.mjs`` is a model for other runtimes.

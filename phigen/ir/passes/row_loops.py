@@ -265,8 +265,8 @@ def bonds_of(
     that end at the site ("b"), or all bonds of the site ("").
 
     ``loop.chosen`` may name one of the two sites of a bond: ``here`` (the site of the loop) or ``there`` (the other
-    site). Then this site must have the colour of the sweep, and all other bonds are skipped. If ``across`` is true,
-    ``loop.chosen`` is not used; a flag of the generated code selects the site instead. The variable `SIDE` is the
+    site). Then the loop skips all bonds at which this site does not have the colour of the sweep. If ``across`` is
+    true, ``loop.chosen`` is not used; a flag of the generated code selects the site instead. The variable `SIDE` is the
     direction of the bond: ``sign`` at the site where the bond begins, −``sign`` at the site where it ends.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]

@@ -10,7 +10,10 @@ from phigen.ir.walk import map_blocks
 
 
 def simultaneous(function: ir.Function) -> ir.Function:
-    """Return a sweep with a variable for each of its increments. A function with a single increment is unchanged."""
+    """Return a sweep in which all increments are computed before any field is updated.
+
+    Variables store the increments. The function is unchanged if it has a single increment, or if it is no sweep.
+    """
     if not function.role.is_sweep:
         return function
 
