@@ -202,8 +202,8 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, Any]:
-    """Return the data files that a run of a lattice reads, as data for JSON: the path of the spec, and the digest of
-    each file.
+    """Return data for JSON: the path of the spec file, and a digest of each data file that a run of a lattice
+    reads.
 
     If the run reads no data files, the result is {}.
     """
