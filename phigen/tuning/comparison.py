@@ -45,8 +45,8 @@ class ComparedMethod:
 
     ``error`` and ``casimirs`` are the largest errors of energy and Casimirs along the run. ``orbit`` is the largest
     distance from the reference solution. ``defect`` is the residual of DΦ π DΦᵀ = π∘Φ. Unknown results are None.
-    ``nanoseconds`` is the time of a step. ``poisson`` says whether a step is a Poisson map by construction, ``own``
-    whether the method is the setting of the spec.
+    ``nanoseconds`` is the time of a step. ``poisson`` is true if a step is a Poisson map by construction. ``own`` is
+    true for the method that the spec states.
     """
 
     title: str

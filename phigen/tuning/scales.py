@@ -21,9 +21,9 @@ PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
 #: period do not resolve it. LEAST_STEPS: least number of steps of a run.
 MOST_TURN, LEAST_STEPS = 2.0, 24
-#: DENSE: largest dimension for which all eigenvalues of the derivative are computed. In higher dimensions the
-#: derivative is applied FOLLOWED times to a vector. The growth of the vector, after the first SETTLING times, gives
-#: slightly less than the largest eigenvalue.
+#: DENSE: largest dimension for which all eigenvalues of the Jacobian matrix are computed. In higher dimensions, a
+#: vector is multiplied FOLLOWED times by the Jacobian matrix. The mean growth of the vector per multiplication, without
+#: the first SETTLING ones, is slightly less than the largest modulus of an eigenvalue.
 DENSE, SETTLING, FOLLOWED = 256, 8, 16
 
 

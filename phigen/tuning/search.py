@@ -118,9 +118,10 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
 
 
 def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Return the step for the accuracy by extrapolation from the smallest step.
+    """Return the step whose expected error is ``accuracy``; None if rounding errors exceed ``accuracy``.
 
-    The result is None if rounding errors are larger than the accuracy.
+    The expected error at the step h is e₀ (h/h₀)^``order``, where h₀ is the smallest step in ``points``, and e₀ is its
+    error.
     """
     last = points[-1]
     if at_floor(points) or accuracy < max(last.unit, last.rounding):
