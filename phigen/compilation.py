@@ -438,7 +438,10 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def unused(self) -> list[tuple[str, ...]]:
-        """Paths of the keys of the spec that have no effect, such as ``terms``: Gauss methods have no series."""
+        """Paths of those keys of the spec that have no effect on a Gauss method.
+
+        One example is ``terms``, since Gauss methods have no series.
+        """
         return [(key,) for key in self.spec.series_settings]
 
     @property
@@ -561,7 +564,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation, which is the compilation of a lattice of any size."""
+        """Return this compilation. The same method of other compilations raises `ValueError`."""
         return self
 
     def by_kind(

@@ -167,7 +167,7 @@ def _invariants(system: System) -> str:
 
 
 def live_section(compilation: Compilation, live: Live) -> Markup:
-    """Return the section with the panel, or with the reason why there is none."""
+    """Return the section of the page with the live panel. If there is no live panel, the section says why."""
     run, system = live.run, compilation.system
     if not live.solvers or run is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")

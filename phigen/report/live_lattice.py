@@ -101,7 +101,7 @@ def lattice_script(live: LatticeLive) -> str:
 
 
 def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Markup:
-    """Return the section with the panel, or with the reason why there is none."""
+    """Return the section of the page with the live panel. If there is no live panel, the section says why."""
     run, start, cell = live.run, live.start, compilation.cell
     if not live.solvers or run is None or start is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
