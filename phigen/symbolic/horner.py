@@ -27,7 +27,7 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
 def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
     """Return the same expression as `horner`; here each key of ``terms`` is a monomial of type `Powers`.
 
-    The caller sorts the pairs of each monomial by index.
+    In each monomial, the pairs (index of a variable, exponent) must be sorted by index.
     """
     left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO

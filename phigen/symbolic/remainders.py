@@ -21,7 +21,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Names, in expressions, of the functions F_0, …, F_3 and G_0, …, G_3. Their arguments are t, a_0, …, a_3.
+#: Names, in expressions, of the functions F_0, …, F_3 and G_0, …, G_3. The head of the module defines these functions.
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 

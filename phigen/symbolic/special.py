@@ -26,7 +26,8 @@ NEAR, MIDDLE = 0.25, 16.0
 NEAR_TERMS, MIDDLE_TERMS = 9, 21
 POLE = 4 * math.pi**2
 
-#: SIMD code, which has no branches, uses a power series with LANE_TERMS terms. It is valid for |s| ≤ LANE_REACH.
+#: SIMD code, which has no branches, computes φ, φ' and φ'' by power series with LANE_TERMS terms. The series are
+#: accurate for |s| ≤ LANE_REACH.
 LANE_REACH, LANE_TERMS = 4.0, 17
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)

@@ -19,9 +19,9 @@ TEMPORARY, WORK, PART = "t", "w", "part"
 #: of the contribution of these terms. The key is the colour of the part and the offset of the neighbour. The value
 #: depends on the position of the site relative to boundary seams.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
-#: Kinds of inputs of transposed functions of lattices. AROUND: cotangent of the change of a field at a neighbour; the
-#: key is the number of the field and the offset. HERE and THERE: cotangents of a sum over bonds or pairs, at the site
-#: itself and at the other site of the bond or pair.
+#: Kinds of symbols that transposed kernels of lattices read. AROUND: cotangent of the change that a sweep makes to a
+#: field at a neighbour. The key of such a symbol is the number of the field, and the offset of the neighbour. HERE and
+#: THERE: cotangents of a sum over bonds or pairs, at the site itself and at the other site of the bond or pair.
 AROUND, HERE, THERE = "change_bar_around", "sums_bar", "sums_bar_there"
 
 
@@ -50,7 +50,8 @@ class Symbol(str):
 #: p_i E_i, where the E_i are the basis of a matrix Lie algebra and the p_i are momenta.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
-#: Kind of the symbols for the increments of Wiener processes in a step. The key is the number of the source of noise.
+#: Kind of the symbols for the increments of Wiener processes in a step. The key of a symbol is the number of its source
+#: of noise.
 INCREMENT = "dw"
 
 #: Symbol of the energy level e = −H(x₀), a constant in the equations of systems with a monitor.

@@ -570,7 +570,10 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        """Return the element Σ parts[k] gᵏ with g = cosroot(s), after replacing g² by 1 − s·sinroot(s)²."""
+        """Return the element Σ parts[k] gᵏ with g² replaced by 1 − s·sinroot(s)².
+
+        Here g is cosroot(s). `phigen.symbolic.entire` defines cosroot and sinroot.
+        """
         generator, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
         square = 1 - g.arguments[0] * sin**2
         return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
