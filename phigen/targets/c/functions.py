@@ -87,11 +87,12 @@ _SMALL = {
 
 
 def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool = False) -> list[str]:
-    """Return the definitions of special functions that the kernels of a program call, except the kernels
-    ``unprinted``.
+    """Return the definitions of special functions that the kernels of a program call.
 
-    Special functions are φ, its derivatives, and the functions of `ENTIRE`. For a splitting, they include the functions
-    that its flows call. On a ``device``, φ is computed without the library function tan.
+    Among the special functions are φ (see `phigen.symbolic.special`), its derivatives, the functions of `ENTIRE`, and
+    elliptic functions. If the step is a splitting, the functions of `FLOW_FUNCTIONS` that flows call are defined too.
+    Calls of φ and its derivatives in the kernels ``unprinted`` do not count. On a ``device``, φ is computed without the
+    library function tan.
     """
     # Loops over the sites of a lattice call other versions of elementary functions, so only the flows of systems
     # without a lattice count here.

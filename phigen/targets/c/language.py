@@ -49,11 +49,11 @@ def _extended(name: str, pattern: str) -> Reserved:
 
 @cache
 def elementary_functions(name: str) -> dict[str, str]:
-    """Return the names that elementary functions have in the code of a solver.
+    """Return the names of elementary functions in the code of a solver, by their names in expressions.
 
-    A solver defines the functions that the C library lacks. The names of these functions begin with the name of the
-    solver. The same holds for versions for small arguments and for SIMD lanes (`phigen.ir.passes.forms`), but some
-    versions are not functions: they are formulas that call other functions.
+    A solver defines functions that the C library lacks, and versions of functions for small arguments and for SIMD
+    lanes (see `phigen.ir.passes.forms`). The names of these functions begin with ``name``, the name of the solver. Some
+    versions are formulas that call other functions. For such a version, the result has the formula in place of a name.
     """
     lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
     formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}

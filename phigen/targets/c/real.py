@@ -160,7 +160,9 @@ def real_of(program: Program) -> Real:
 
 
 def rendered(program: Program, template: str, values: Mapping[str, object]) -> str:
-    """Return the text of a template of C, in the type of a program."""
+    """Return the text of a C template, filled with ``values``. Real numbers in the text have the type that the program
+    uses.
+    """
     return real_of(program).spelt(render("c", template, {"NAME": program.name, **values}))
 
 

@@ -1,5 +1,5 @@
-"""The text of steps in C: a record for each kind of step, which `phigen.targets.c.emitter` inserts into the files of a
-solver.
+"""The parts of a C solver that depend on the kind of step. The functions of a `StepText` return these parts, and
+`phigen.targets.c.emitter` inserts the parts into the files of the solver.
 """
 
 from __future__ import annotations

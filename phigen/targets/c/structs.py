@@ -140,8 +140,8 @@ BACK_GROUP = (
     ),
 )
 
-#: Members of the struct for the reverse pass of a lattice: derivatives of L, the number whose gradient is computed, and
-#: pointers to arrays.
+#: Members of the struct for the reverse pass of a lattice. Derivatives are those of L, the number whose gradient is
+#: computed.
 TRANSPOSE = (
     StateBlock(
         "bar",

@@ -23,9 +23,10 @@ def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[
     """Return the lines of a file with qualifiers for devices. Lines before `DEVICES_ONLY` are not changed.
 
     Functions get the qualifier `NAME_FUNCTION`, which contains the word static; tables get `NAME_CONSTANT`. Kernels are
-    not changed, since the runtime declares them with their qualifiers. If all members may have ``common`` coefficients,
-    parameters for coefficients get the address space `NAME_COEF`. Raises `ValueError` for a variable that has no
-    address space on devices: a variable outside functions that is not constant, or a static variable inside a function.
+    not changed, since the runtime declares them with their qualifiers. If ``common`` is true, members of an ensemble
+    may share coefficients. Then parameters for coefficients get the address space `NAME_COEF`. Raises `ValueError` for
+    a variable that has no address space on devices: a variable outside functions that is not constant, or a static
+    variable inside a function.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]

@@ -83,10 +83,11 @@ class _Pulled:
     """A transposed kernel of a ``sweep`` or of a stage, and the arrays of its cotangents.
 
     The kernel reads the cotangents of the outputs of the original kernel, as symbols of the kind ``seed``. These
-    cotangents are in the arrays with the numbers ``bars``. If ``bars`` is empty, they are in the arrays ``varied`` of
-    the row record. ``gather`` has the sums that the kernel reads. ``ends`` has three items for each loop that computes
-    these sums: the bonds or pairs with their kernel, the parameters that change sign at the end b of a bond, and the
-    transpose of the kernel. ``before`` are statements that a row segment executes before the calls.
+    cotangents are in the arrays with the numbers ``bars``. If ``bars`` is empty, they are in the arrays ``varied`` in
+    the record of a row segment. ``gather`` has the sums that the kernel reads. ``ends`` has three items for each loop
+    that computes these sums: the bonds or pairs with their kernel, the parameters that change sign at the end b of a
+    bond, and the transpose of the kernel. ``before`` are statements that stand before the calls of the transposed
+    kernel.
 
     The fields ``recomputed`` are recomputed by the kernel or, if ``undo`` is set, by the kernel ``undo``. The kernel
     ``undo`` reads sums that the transposes over bonds or pairs compute. ``taken`` are contributions of the previous
@@ -246,9 +247,10 @@ class _Reverse(RowLoops):
             yield replace(both, first=(*both.first, *copied), second=second)
 
     def of_equation(self) -> Iterator[Back]:
-        """Yield, for each transposed kernel of a stage, its calls in the two traversals of the sites.
+        """Yield the loops and calls for each transposed kernel of a stage.
 
-        The first traversal of the first kernel also computes the sums over bonds or pairs.
+        The sites are traversed twice for each kernel (see the head of the module). For the first kernel, the first
+        traversal also computes the sums over bonds or pairs.
         """
         layout, fields, gather = self.layout, self.program.coordinates, self.layout.partners.field
         transposed = [
@@ -346,7 +348,7 @@ class _Reverse(RowLoops):
             yield ends, opposite, replace(self.kernels[first.kernel.name + BACK], name=ends.kernel.name + BACK)
 
     def _gathered(self, sweep: Sweep) -> Iterator[ir.Statement]:
-        """Yield the calls of the loops that compute the sums over bonds or pairs which a sweep reads.
+        """Yield the calls of the loops over bonds or pairs that compute sums for a sweep.
 
         If several loops have equal code, the first of them is called.
         """

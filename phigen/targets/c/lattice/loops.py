@@ -200,9 +200,9 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        First it calls the functions that compute sums over bonds or pairs. On a graph without implicit stages, the
-        function computes the sums itself, in inner loops over the bonds of each site, since nothing else needs the
-        sums.
+        The function first calls other functions, which compute sums over bonds or pairs. There is one exception: on a
+        graph, if steps have no implicit stages, only observables need the sums. In this case the function computes the
+        sums itself, in inner loops over the bonds of each site.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

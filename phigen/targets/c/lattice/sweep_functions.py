@@ -1,4 +1,6 @@
-"""The sweeps of a step of a lattice in C: loops over the sites for each part of H, and the functions that call them."""
+"""The sweeps of a lattice in C: row functions, which run over the sites of a row segment, and row drivers, which call
+row functions for all row segments.
+"""
 
 from __future__ import annotations
 
