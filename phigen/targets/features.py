@@ -1,4 +1,4 @@
-"""Features of solvers: switches that say which parts of the runtimes a solver has, with their conditions."""
+"""The features of a solver: switches that turn parts of its runtime on or off, as the program requires."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def policies_of(program: Program) -> dict[str, Policy]:
 
 @dataclass(frozen=True)
 class PolicySpelling:
-    """The way a language declares the constants of policies.
+    """The way a language declares the constants of a `Policy`, such as tolerances and limits of iterations.
 
     ``power`` is the format of a power of two with a negative exponent. ``written`` returns the text that declares
     constants. ``rounded`` prints real numbers for solvers whose precision is not double.

@@ -119,7 +119,8 @@ def _closed_forms(function: str) -> list[Expression]:
 
 
 def full_range(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
-    """Return the closed form of a function of `ENTIRE` as text, and whether it contains the ``root`` of |s|.
+    """Return two template values for a function of s that `ENTIRE` lists: ``full_range``, the text of the closed form,
+    and ``root``, which says whether the text contains the variable root = √|s|.
 
     ``choice`` is the format of a conditional in the language: {0} is the value for s > 0, {1} for s < 0.
     """

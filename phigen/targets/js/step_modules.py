@@ -1,5 +1,5 @@
-"""The text of steps in JavaScript: a record for each kind of step, which `phigen.targets.js.emitter` inserts into
-modules.
+"""The parts of JavaScript modules that depend on the kind of step. The functions of a `StepModule` return these parts,
+and `phigen.targets.js.emitter` inserts the parts into modules.
 """
 
 from __future__ import annotations

@@ -61,10 +61,11 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Return the factors of several products of group elements, by the name of the product. The two factors are in the
-    order of the multiplication.
+    """Return the template values that depend on ``spatial``: pairs of arguments for products of group elements, and for
+    the rotation of a vector.
 
-    If momenta are in space coordinates (``spatial``), later factors are on the left.
+    ``spatial`` says that momenta are in space coordinates. If so, the factor of the later motion is on the left,
+    otherwise on the right.
     """
     pairs = {
         "uniform_first": ("first", "_uniform(rate, t)"),

@@ -27,7 +27,7 @@ _OF_TAU = """
     of their times t."""
 
 
-#: Constants of policies that NumPy modules do not read.
+#: Names of constants in `phigen.scheme.policies` that NumPy modules do not read.
 _NOT_IN_NUMPY = ("TRIALS", "LONGEST_PATH")
 
 
@@ -105,8 +105,8 @@ def _of_step(program: Program) -> dict[str, object]:
 
 
 def _of_noise(program: Program) -> dict[str, object]:
-    """Return the template values that concern noise: arguments of functions, and text for docstrings. Other values are
-    expressions for coefficients that depend on time or noise.
+    """Return the template values that concern noise. The values are arguments of functions, text for docstrings, and
+    code that renews the coefficients that depend on time or noise.
     """
     noise = program.noise
     renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
