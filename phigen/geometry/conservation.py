@@ -28,7 +28,7 @@ LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
-#: Kind of the unit of a quantity that is infinite or NaN at the start, so that it has no errors.
+#: `Unit.kind` for a quantity that is infinite or NaN at the start. The errors of this quantity are unknown.
 UNDEFINED = "no value at the start"
 
 #: Name of the energy among the conserved quantities of a system.

@@ -85,9 +85,7 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the value of an expression at a sample point is 0 up to rounding. Only in this case is a proof
-    attempted.
-    """
+    """Whether an expression may be 0 everywhere: at a sample point, the value of the expression is 0 up to rounding."""
     names = symbols_of(e)
     for k in range(POINTS):
         try:

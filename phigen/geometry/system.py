@@ -117,7 +117,10 @@ class System:
         return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
 
     def vector_field(self) -> tuple[Expression, ...]:
-        """Return the vector field π(∇H + ζ) + f, one expression for each coordinate, without noise."""
+        """Return the vector field π(∇H + ζ) + f, one expression for each coordinate. Noise is left out.
+
+        ζ is the covector force, and f is the vector force.
+        """
         slope = gradient(self.hamiltonian, self.coordinates)
         if self.forces is None:
             return hamiltonian_vector_field(self.poisson, slope)
@@ -128,6 +131,8 @@ class System:
     def forced_rate(self, function: Expression) -> Expression:
         """Return the contribution of the forces to dF/dt for a function F: ∇F·(πζ + f). For F = H, this is the power of
         the forces.
+
+        ζ is the covector force, and f is the vector force.
         """
         if self.forces is None:
             return ZERO
@@ -136,7 +141,9 @@ class System:
         return total(s * (a + b) for s, a, b in zip(slopes, field, self.forces.vector, strict=True) if not s.is_zero)
 
     def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
-        """Return the contribution of the forces to dC/dt for a Casimir C: ∇C·f, since πζ does not change C."""
+        """Return the contribution of the vector force f to dC/dt for a Casimir C: ∇C·f. The covector force does not
+        change C.
+        """
         if self.forces is None:
             return ZERO
         slopes = gradient(casimir, self.coordinates)
@@ -212,7 +219,7 @@ def system_from_spec(spec: Spec) -> System:
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
-    """Return the error for a lattice in a place where a system with a fixed number of coordinates is required."""
+    """Return the exception to raise if the spec is a lattice, but a fixed number of coordinates is needed."""
     message = f"{spec.name} is a lattice; a system with a fixed number of coordinates is needed here"
     hint = "phigen.compile accepts it; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
