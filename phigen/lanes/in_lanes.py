@@ -238,7 +238,8 @@ def _of_gauss(program: Program, step: Gauss) -> Stages | None:
 
 
 def _rows(program: Program, step: Sweeps) -> Rows:
-    """Return the lanes of a lattice.
+    """Return the `Rows` of a lattice: which functions the loops over sites call, and which functions have a fast
+    version.
 
     Polynomials for small arguments, and most vector versions of functions, are used only in the profile ``fast``.
     Observables are evaluated rarely, so they call libm, whose functions accept any argument.
@@ -301,7 +302,7 @@ def _stages(program: Program, step: Gauss) -> Stages:
 def _batched_stages(program: Program, step: Gauss) -> tuple[LaneKernel, ...]:
     """Return the kernels of a Gauss step for batches of members, with one member in each lane.
 
-    Returns () if members one by one are faster, or if the arrays of a batch would need too much stack.
+    Returns () if it is faster to compute members one by one, or if the arrays of a batch need too much stack.
     """
     arrays = MEMBER_BATCHES * step.tableau.stages * step.unknowns + 6 * program.dimension
     if _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
