@@ -75,7 +75,7 @@ def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tupl
     """Return pairs of a name and a text: the parts of H, and for each flow the coordinates after the time h.
 
     Long formulas contain symbols σ_1, σ_2, … for repeated subexpressions; the definitions of these symbols follow the
-    formulas of the flow. After all flows, the matrices of exponentials are listed.
+    formulas of the flow. The last pairs define the matrix exponentials that occur in the flows.
     """
     equations: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):

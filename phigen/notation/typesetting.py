@@ -46,7 +46,7 @@ _TALL = ("mfrac", "msqrt", "mroot", "mtable")
 
 @dataclass(frozen=True)
 class Atom:
-    """Part of a formula in LaTeX that is not broken, with its width in em.
+    """Part of a LaTeX formula, with its width in em. A line never breaks inside a part.
 
     ``level`` determines the cost of a line break before the part: it is the number of pairs of parentheses around the
     break, plus `_FACTORS` for a break between two factors. If ``level`` is None, no line may break there.
@@ -127,9 +127,10 @@ def _flattened(elements: Sequence[Element]) -> Iterator[Element]:
 
 
 def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[Atom]:
-    """Return MathML elements side by side as atoms, inside ``depth`` parentheses.
+    """Return MathML elements side by side as `Atom` objects.
 
-    ``whole`` says that the line will not be broken, so that wide fractions and exponents need not be written inline.
+    ``depth`` is the number of pairs of parentheses around the elements. ``whole`` says that the line will not be
+    broken, so that wide fractions and exponents need not be written inline.
     """
     flat, listed_atoms, bars = list(_flattened(elements)), list[Atom](), 0
     tall = _tall_parentheses(flat)
