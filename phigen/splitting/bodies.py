@@ -39,10 +39,10 @@ class _NoBodiesError(Exception):
 
 
 def split_bodies(system: System, change: str) -> SplitHamiltonian:
-    """Return H as the sum of Kepler motions A and a remainder B, in the relative coordinates called ``change`` in
-    specs.
+    """Return H as the sum of Kepler motions A and a remainder B, in relative coordinates.
 
-    Raises `SpecError`, located at the key `KEY` of the spec, if H is not that of attracting bodies.
+    ``change`` is the name of the relative coordinates in specs, such as ``jacobi``. Raises `SpecError`, located at the
+    key `KEY` of the spec, if H is not that of attracting bodies.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)

@@ -97,7 +97,10 @@ def _closed(
 
 
 def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
-    """Return the derivative of a monomial as a map: monomial in the moving variables → coefficient."""
+    """Return the time derivative of the monomial ``m`` as a map: monomial → coefficient.
+
+    ``rates`` has the time derivatives of the variables that change. Only these variables occur in the monomials.
+    """
     parts = []
     for v, rate in rates.items():
         if m[v]:

@@ -103,7 +103,9 @@ class Addition:
 
     @classmethod
     def at(cls, x: Vector, factors: Vector, time: Expression) -> Addition:
-        """Return the `Addition` for the flow from ``x`` over the duration ``time``; ``factors`` are the α_i."""
+        """Return the `Addition` for the flow from ``x`` over the duration ``time``. ``factors`` are the constants α_i
+        of the equations ẋ_i = α_i x_j x_k.
+        """
         levels = levels_of(x, factors)
         conditions = _order(levels)
         low, middle, high = sorted_by(conditions, levels)

@@ -57,8 +57,10 @@ def force_flows(system: System) -> tuple[Flow, ...]:
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
-    """Return the flows of the forces in closed form: one flow of the whole field πζ + f or, if there is none, flows of
-    πζ, f or their summands.
+    """Return flows of the forces in closed form.
+
+    ζ is the covector force, and f is the vector force. If phigen knows the flow of the whole field πζ + f, this flow is
+    the only one. Otherwise the result has flows for πζ and f, or for their summands.
     """
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     common_flow = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))

@@ -122,7 +122,7 @@ class _Orbit:
 
     @property
     def spin(self) -> Expression:
-        """The square of the angular momentum per mass, |q × v|² with v = wp."""
+        """The square |q × v|² of the specific angular momentum, for the inverse mass w and the velocity v = wp."""
         pairs = list(combinations(zip(self.position, self.momentum, strict=True), 2))
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 

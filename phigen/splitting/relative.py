@@ -112,9 +112,9 @@ class RelativeMotions:
         """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
         motion.
 
-        ``spread`` converts changes of Q_i and P_i to changes of Cartesian coordinates. The definitions of Q_i and P_i
-        convert in the opposite direction. The first expressions vanish if the second conversion is the inverse of the
-        first one. The other expressions are the identities of Kepler motions.
+        ``spread`` converts changes of the relative coordinates Q_i, P_i to changes of Cartesian coordinates. The
+        expressions with labels ``change of …`` vanish if ``spread`` is the inverse of the definitions of Q_i and P_i.
+        The other expressions are the identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)

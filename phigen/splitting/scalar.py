@@ -2,8 +2,7 @@
 
 For each of the following forms of r, with constants a, b, c, k and n, the coordinate after the time t is:
 
-- r = az² + bz + c: z + r T/(1 − (az + b/2)T) with T = tanh(wt)/w and w² = b²/4 − ac, written by the entire functions
-  cosroot and sinroot
+- r = az² + bz + c: z + r T/(1 − (az + b/2)T) with T = tanh(wt)/w, where w² = b²/4 − ac may also be 0 or negative
 - r' = kr: z − log(1 − krt)/k
 - zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
 

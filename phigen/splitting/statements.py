@@ -144,9 +144,9 @@ def _sine_and_cosine_of_sum(e: Expression) -> tuple[Expression, Expression]:
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     """Return the statement that the flow Φ of part k satisfies Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t.
 
-    If the part is a force, its vector field takes the place of π∇H_k. An equation in X∘Φ_t is not decided if Φ_t
-    contains exponentials, or the sign of a coordinate, such as in a drag proportional to x|x|. In these cases the
-    equivalent equation of `_transport_residuals` may be proved.
+    If the part is a force, its vector field takes the place of π∇H_k. The equation for dΦ_t/dt is not decided if Φ_t
+    contains exponentials or the sign of a coordinate. Then the equivalent equation of `_transport_residuals` may be
+    proved.
     """
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
