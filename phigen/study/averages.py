@@ -87,7 +87,10 @@ class Averages:
         return first, last
 
     def see(self, t: Floats, rows: Floats) -> None:
-        """Add rows (rows, width) at the times t (rows,), in the order of the run."""
+        """Include new rows of values in the averages. Calls follow the order of the run.
+
+        ``rows`` has the shape (count, width), and ``t`` has the times of the rows (count,).
+        """
         selected = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
         t, rows = t[selected], rows[selected]
         if not len(rows) or not rows.shape[1]:

@@ -39,10 +39,10 @@ class NotOfferedError(ValueError):
 
 @dataclass(frozen=True)
 class ModifiedHamiltonian:
-    """Modified Hamiltonian H̃ = Σ h^j terms[j]; ``values`` has the values of all symbols except the coordinates.
+    """Modified Hamiltonian H̃ = Σ h^j terms[j]. With m corrections, the sum is over j < powers[m].
 
-    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, which determines the unit of the
-    errors.
+    ``values`` has the values of all symbols except the coordinates. ``hamiltonian`` is H, which determines the unit of
+    the errors.
     """
 
     terms: tuple[Expression, ...]
@@ -99,8 +99,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # The terms are shorter if the parameters are numbers. If the series cannot represent roots of these numbers, the
-    # terms are computed with symbols instead.
+    # Formulas are shorter if numbers take the place of the parameters. But the series cannot represent roots of some
+    # numbers. Then the parameters remain symbols.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for exact_values in (exact, {}):

@@ -36,7 +36,8 @@ _FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5
 #: value. Finite differences cannot resolve smaller derivatives.
 _LEAST = 1e-3
 #: _DIRECTIONS: number of random directions in which the initial state is displaced. _MOST_COLUMNS: for states with at
-#: most this number of coordinates, the tangent vectors are all unit vectors; for longer states they are random.
+#: most this number of coordinates, there is one tangent vector along each coordinate; for longer states, the tangent
+#: vectors are random.
 _DIRECTIONS, _MOST_COLUMNS = 3, 64
 
 #: Result of a check: its name, the measured value, the limit, and the cause to report if the value exceeds the limit.

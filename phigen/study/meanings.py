@@ -18,7 +18,7 @@ class Meaning:
 
 
 #: Cause of a failure for all checks that judge the drift of the energy.
-_DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for such a Hamiltonian"
+_DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large"
 
 MEANINGS = (
     Meaning(

@@ -30,7 +30,7 @@ def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[F
 def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
     """Return the method of a solver with a monitor. In the states of the method, the time t is the last coordinate.
 
-    ``gauge`` fixes the energy level e, so that all steps are the same map.
+    ``gauge`` has the energy level e. All steps use this e, so that they are the same map.
     """
     fixed_gauge = Solver(solver.backend.with_gauge(gauge), solver.interface)
 

@@ -231,7 +231,10 @@ class Watch:
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:
-        """Count the turning points of each coordinate: in the first window, and in the whole run."""
+        """Count the turning points of each coordinate in the first window and in the whole run.
+
+        Windows are explained at `WINDOWS`. For each row of ``x``, ``windows`` has the number of the window.
+        """
         state = self.state
         previous = state["final"] if np.isfinite(state["final"]).all() else x[0]
         for i, moves in enumerate(np.diff(x, axis=0, prepend=previous[None]).T):

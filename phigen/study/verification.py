@@ -126,7 +126,7 @@ class Subject:
 
     @property
     def main(self) -> Method:
-        """The method of the first target, C if available, for measurements that need only one target."""
+        """The solver of the first target (C if available) as a `Method`, for measurements that need only one target."""
         return next(iter(self.own.values()))
 
     @property
