@@ -11,4 +11,4 @@ from phigen.runtime.toolchain import available
 @pytest.mark.skipif(not available(), reason="no C compiler")
 @pytest.mark.slow
 def test_the_page_can_be_followed(tmp_path):
-    assert follow(Path(__file__).resolve().parent.parent / "docs" / "recipes.md", tmp_path) == 15
+    assert follow(Path(__file__).resolve().parent.parent / "docs" / "recipes.md", tmp_path) == 17
