@@ -117,7 +117,7 @@ class _Member:
         plan, marks = self.plan, row_steps(self.plan.steps, self.plan.frames or max(1, self.plan.steps)).tolist()
         statistics = plan.statistics(self.solver.interface.observables)
         over_run = any(statistic.of for statistic in statistics.values())
-        observed = row_steps(plan.steps, plan.frames or plan.stride).tolist() if over_run else []
+        observed = (list(plan.rows) or row_steps(plan.steps, plan.stride).tolist()) if over_run else []
         averages = Averages(
             len(self.solver.interface.observables), after=plan.after, backwards=h < 0, blocks=plan.blocks
         )

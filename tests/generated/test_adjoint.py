@@ -515,3 +515,16 @@ def test_batches_define_functions_that_only_transposes_call(kick, composition):
     ahead, behind = (solve.ensemble(start + sign * 1e-5 * along, 0.1, 6) for sign in (1, -1))
     by_differences = np.sum(bars * (ahead - behind), axis=1) / 2e-5
     np.testing.assert_allclose(np.sum(slopes * along, axis=1), by_differences, rtol=1e-8, atol=1e-8)
+
+
+def test_gradients_of_casimirs_along_paths_are_those_at_the_start_in_single_precision():
+    """In these gradients, the cotangents of p and of the coefficient ``a`` vanish, because their terms cancel."""
+    bracket = '{x: {y: "a*z**2", z: "-a*y"}, y: {z: "a*x*(1 + x)"}}'
+    text = f"coordinates: [x, y, z]\nparameters: {{a: 1}}\npoisson: {{brackets: {bracket}}}\norder: 2\nadjoint: true\n"
+    text += "hamiltonian: x**2/2 + y**2 + 3*z**2/2 + x*y\nbirealisation: karasev\nreal: float\n" + SHORT
+    single = compile(spec.loads(f"phigen: 1\nname: cubic\n{text}"))
+    start = np.array([0.3, 0.1, 0.15])
+    end = single.integrate(start, 0.01, 10, 10).x[-1]
+    pulled = single.pullback(start, 0.01, 10, [end[0] + end[0] ** 2, end[1], end[2] ** 2])
+    np.testing.assert_allclose(pulled.x0_bar, [0.3 + 0.3**2, 0.1, 0.15**2], rtol=0, atol=1e-6)
+    assert abs(float(pulled.parameters_bar["a"])) < 1e-6

@@ -143,6 +143,15 @@ def test_statistics_of_lattices_are_those_of_single_runs(tmp_path):
     assert float(data["energy_error"][1, 0]) == pytest.approx(energy, rel=1e-9)
 
 
+@pytest.mark.slow  # the test starts a cluster of workers
+def test_statistics_of_lattices_are_over_the_frames():
+    data = phigen.sweep(phigen.spec.loads(CHAIN), frames=70, workers=1, keep=["mean(heat)", "std(heat)"])
+    assert data["frame"].values.tolist() == [0, 70, 140, 210, 280, 350]
+    heat = (data["frames"].sel(coordinate="p").values[..., 1:, :] ** 2).mean(axis=-1)  # the start is before t = 3
+    np.testing.assert_allclose(data["mean(heat)"], heat.mean(axis=-1), rtol=1e-12)
+    np.testing.assert_allclose(data["std(heat)"], heat.std(axis=-1, ddof=1), rtol=1e-12)
+
+
 def test_sweeps_of_lattices_keep_numbers_only():
     with pytest.raises(phigen.SpecError, match=r"keep: 'mean\(local\)' is not known"):
         phigen.spec.loads(CHAIN.replace("mean(heat)", "mean(local)"))

@@ -19,17 +19,22 @@ static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
     for (int i = 0; i < PHI_BACK; ++i) sizes[i < 3 * PHI_DIM ? i / PHI_DIM : 3] += fabs(values[i]);
 }
 
-/* Whether the slope of the Taylor series at m satisfies the differential equation of a path integrated backward. */
+/* Whether the slope of the Taylor series at m satisfies the differential equation of a path integrated backward. The
+   slopes of the cotangents of p and of the coefficients are sums over products of pi with the cotangent of the state.
+   Their terms may cancel, so errors are also compared with the sizes of these terms. */
 static int phi_back_holds(const double *coef, const double p[PHI_BACK], const double m[PHI_BACK],
     const double slope[PHI_BACK])
 {
-    double field[PHI_BACK], of_m[4], of_slope[4];
+    double field[PHI_BACK], of_m[4], of_slope[4], of_p = 0.0;
     phi_back_field(coef, p, m, field);
     phi_back_sizes(m, of_m);
     phi_back_sizes(slope, of_slope);
+    for (int i = 0; i < PHI_DIM; ++i) of_p += fabs(p[i]);
     for (int i = 0; i < PHI_BACK; ++i) {
         const int g = i < 3 * PHI_DIM ? i / PHI_DIM : 3;
-        if (!(fabs(field[i] - slope[i]) <= PHI_BACK_ROUNDED_SLOPE * (of_m[g] + of_slope[g]) + DBL_MIN)) return 0;
+        const double factor = g == 2 ? of_p : g == 3 ? fabs(coef[phi_back_used[i - 3 * PHI_DIM]]) : 0.0;
+        const double terms = factor > 0.0 ? of_slope[0] * of_m[1] / factor : 0.0;
+        if (!(fabs(field[i] - slope[i]) <= PHI_BACK_ROUNDED_SLOPE * (of_m[g] + of_slope[g] + terms) + DBL_MIN)) return 0;
     }
     return 1;
 }
