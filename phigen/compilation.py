@@ -564,7 +564,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation. The same method of other compilations raises `ValueError`."""
+        """Return this compilation. In the classes for other systems, this method raises `ValueError`."""
         return self
 
     def by_kind(

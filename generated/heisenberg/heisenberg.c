@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: aa71e6efaacb43e929ce98be71a97f4b5d55a12c20f9ced9e7eaca943e132369
+ * body-sha256: 0e921b7660ed213c12e22e40cbc23a239726ff336c2ca4128b90f93c47cdf338
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -247,7 +247,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep1_near, for arguments of any size. */
+/* As heisenberg_sweep1_near, with functions for arguments of any size. */
 static inline void heisenberg_sweep1_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -295,7 +295,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep2_near, for arguments of any size. */
+/* As heisenberg_sweep2_near, with functions for arguments of any size. */
 static inline void heisenberg_sweep2_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -343,7 +343,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As heisenberg_sweep3_near, for arguments of any size. */
+/* As heisenberg_sweep3_near, with functions for arguments of any size. */
 static inline void heisenberg_sweep3_full_range(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -367,7 +367,8 @@ static inline void heisenberg_sweep3_full_range(const double *coef, const heisen
     }
 }
 
-/* The flow of H_1, for arguments of any size, for the row segments first ... end - 1. */
+/* The flow of H_1, with functions that accept arguments of any size, for the row segments first ... end -
+   1. */
 static void heisenberg_rows1_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {
@@ -390,7 +391,8 @@ static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_2, for arguments of any size, for the row segments first ... end - 1. */
+/* The flow of H_2, with functions that accept arguments of any size, for the row segments first ... end -
+   1. */
 static void heisenberg_rows2_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {
@@ -413,7 +415,8 @@ static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef
     }
 }
 
-/* The flow of H_3, for arguments of any size, for the row segments first ... end - 1. */
+/* The flow of H_3, with functions that accept arguments of any size, for the row segments first ... end -
+   1. */
 static void heisenberg_rows3_full_range(const heisenberg_solver *s, const double *coef, size_t first,
     size_t end)
 {

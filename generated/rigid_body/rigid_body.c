@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: ff808bd539f6619e8291f6d356d486418b50298e252ebb9f09563d97697b7ab2
+ * body-sha256: caee359b1b1cb9bb8929188adf58a4612136b4111e98030735b4243b69b5b7f0
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -425,7 +425,7 @@ static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], doub
 
 /* Largest accepted error of a recurrence for values to which it was not fitted, relative to the largest
    value. If the error is larger, the motion is chaotic or the step long, and other predictors are as good. */
-#define rigid_body_HOPELESS 1e-7
+#define rigid_body_MAX_FIT_ERROR 1e-7
 
 /* number of equations of the least-squares problem */
 enum { rigid_body_ROWS = (int)rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
@@ -514,7 +514,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return rigid_body_missed(value + ROWS, weight) <= rigid_body_HOPELESS * largest ? terms : 0;
+    return rigid_body_missed(value + ROWS, weight) <= rigid_body_MAX_FIT_ERROR * largest ? terms : 0;
 }
 
 /* ---- Predictors ---- */
@@ -1751,13 +1751,13 @@ static void rigid_body_put_member(const rigid_body_members *all, size_t m, const
 /* ---- SIMD batches of members: implicit steps ---- */
 enum {
     rigid_body_GROUP = rigid_body_LANES, /* number of members of a group, one in each lane */
-    /* smallest number of members that are faster together than one by one; measured */
+    /* smallest number of members whose joint integration is faster; measured */
     rigid_body_FEWEST = 3,
     /* number of steps that repay a fit; measured. It is large, since a fit predicts one solution, not eight
        as in a block */
     rigid_body_GROUP_REPAY = 5000 * rigid_body_DIM,
-    /* slow steps until recurrences that did not help are fitted again */
-    rigid_body_HOPELESS_WAIT = 100 * rigid_body_REPAY
+    /* if recurrences did not help: number of steps that take several iterations until the next fit */
+    rigid_body_REFIT_WAIT = 100 * rigid_body_REPAY
 };
 
 /* Members of an ensemble, one in each lane. */
@@ -1883,7 +1883,7 @@ static void rigid_body_group_fit(rigid_body_group *group)
     ++group->fits;
     group->slow_steps = 0;
     group->slow_steps_allowed = helped && group->slow_steps_allowed < rigid_body_LONG_WAIT / 2
-        ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
+        ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_REFIT_WAIT;
 }
 
 /* In each lane whose prediction y is not near `last`, set y to `last`: from elsewhere, the iteration could

@@ -154,9 +154,9 @@ class Evaluation:
             # "rest" adds an error for the terms that the C leaves out of a Taylor series. The operand a[0] is the sum
             # of the terms that the C always adds. The operands a[3:] are the next terms of the series: the C may add
             # some of them, and adds no later terms. The sum of the terms a[3:] and all later terms is at most ``tail``,
-            # by Lagrange's form of the remainder. The sum of those that the C adds is at most Σ |a[3:]|. In the mean of
-            # a path, each of these terms has a divisor of at least a[2]; otherwise a[2] is 1. The factors 3 and 2
-            # enlarge the bound, so that it also covers derivatives of the series.
+            # by Lagrange's form of the remainder. The sum of those that the C adds is at most Σ |a[3:]|. If the series
+            # is the mean of a path, the terms from a[3] on are divided by a[2] or more; otherwise a[2] is 1. The bound
+            # is 3 (tail + 2 Σ |a[3:]|)/a[2]. It has the factors 3 and 2 to hold for derivatives of the series, too.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]

@@ -150,10 +150,12 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
         eigenvalues.append((m, Fraction(1), True))  # sl(n): S has the dimension of g
     n = (1 + isqrt(1 + 8 * m)) // 2
     if n * (n - 1) == 2 * m and not centre:
-        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices of trace 0
+        eigenvalues.append(
+            (n * (n + 1) // 2 - 1, Fraction(n, n - 2), False)
+        )  # so(n): S has the symmetric matrices of trace 0
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): skew-Hamiltonian matrices of trace 0
+        # sp(2n): S consists of the skew-Hamiltonian matrices of trace 0
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:

@@ -230,10 +230,11 @@ def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int
     """Return the changes of the momenta x_a since the start of a step, as functions of the unknowns, without
     cancellation.
 
-    A change is x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and the basis E_a of the Lie algebra. For
-    G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. If the algebra has an ideal, there is a functional λ =
-    x̃ + u with the unknown u. The change is then u(E_a) + λ(E_a w*) for each E_a outside the ideal. If there is a frame
-    F, the change is k̃(U E_a U*) − k̃(F E_a F*) with U = FG; `phigen.gauss.lift` defines the functional k̃.
+    Let E_a be the basis of the Lie algebra, and x̃ the functional on the star algebra with x̃(E_a) = x_a that is 0 on
+    symmetric elements. A change is x̃(G E_a G*) − x_a. For G = 1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is
+    skew. If the unknowns include a functional u, for an ideal of the star algebra, let λ = x̃ + u. The change is then
+    u(E_a) + λ(E_a w*) for each E_a outside the ideal. If there is a frame F, the change is k̃(U E_a U*) − k̃(F E_a F*)
+    with U = FG; `phigen.gauss.lift` defines the functional k̃.
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)

@@ -252,8 +252,8 @@ class CrossingFinder(Generic[C]):
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
         """Return the fraction of interval ``j`` at which sign·g is smallest, by a golden-section search.
 
-        The number ``v[j]`` is the value of g at the start of the interval. The search ends early at a fraction where g
-        has another sign.
+        g is the function whose zeros are the crossings, and ``v[j]`` is its value at the start of the interval. The
+        search ends early at a fraction where the sign of g differs from that of ``v[j]``.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN

@@ -95,7 +95,7 @@ class LatticeCourse:
             sites.advance(h, steps)
         except BackendError:
             if self.steps == self._clock.counted:
-                # No step of size h was made. Copies start with the step size of the clock, and might fail with size h.
+                # No step of size h succeeded. A copy of this session starts with the step size of the clock.
                 self._clock.h = earlier_h
             raise
 

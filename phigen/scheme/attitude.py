@@ -86,7 +86,7 @@ def gauss_attitude(
     if not points.realisation.exact:
         raise refused(
             system,
-            "reconstruct: with structure: to truncation there is no group element",
+            "`reconstruct` needs the rotation that a step makes, but steps with `structure: to truncation` have none",
             f"structure: exact, or {series}",
         )
     if group.matrices:

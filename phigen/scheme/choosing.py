@@ -201,7 +201,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
             f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} to depend only on coordinates "
             "that commute"
         )
-        hint = "use coordinates_from: jacobi, where B is of this kind, or composition: wisdom-holman-17, for every B"
+        hint = "write coordinates_from: jacobi, which makes such a B, or composition: wisdom-holman-17, for any B"
         raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
     return replace(choice, splitting=SplitHamiltonian((modified, large_flow), kick=0, small=0))
 

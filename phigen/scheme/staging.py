@@ -82,8 +82,8 @@ class Coefficients:
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """Two numbers for each matrix tA: the index of its first entry in the table of coefficients, and its number of
-        rows.
+        """Two numbers for each matrix tA whose exponential is in the table: the index of its first entry in the table,
+        and its number of rows.
         """
         blocks, start = [], len(self.values)
         for exponential in self.exponentials:

@@ -404,9 +404,10 @@ class ReducedSweeps:
 class Lift:
     """Frames of a Gauss step: quaternions F, at which the group elements of the step start instead of at 1.
 
-    ``functionals`` computes a vector y of three numbers for each copy of the quaternions; F satisfies F* k F = y. The
-    frames have ``size`` components, which are the last unknowns of the step. ``copies`` has, for each copy of the
-    quaternions, the places of its basis 1, i, j, k among these components.
+    The star algebra contains copies of the quaternions, with the basis 1, i, j, k. There is a frame F for each copy.
+    ``functionals`` computes a vector y of three numbers for each copy; F satisfies F* k F = y. All frames together have
+    ``size`` components, which are the last unknowns of the step. ``copies`` has, for each copy, the indices of the
+    components along 1, i, j, k.
     """
 
     functionals: Kernel
@@ -743,10 +744,10 @@ class Sweeps(_Scheduled):
     the parts in the order of their flows. For a step with a generating function there is an ``equation`` instead of
     parts, and the schedule lists the stages.
 
-    On a graph a part may belong to one colour (``by_colour``); the flows of all parts are then repeated for each
-    colour. In this case each number in the ``schedule`` stands for a sequence of flows: 0 for the first flow, 1 for the
-    flows in the middle, 2 for the last flow, and 3 for the flows in the middle in reverse order. If H depends on the
-    time, the advance of the time is the last flow, and the flow of the last part is one in the middle.
+    On a graph, ``by_colour`` may be true. The flows of all parts are then repeated for each colour, and form one list.
+    A number in the ``schedule`` selects flows of this list: 0 the first, 1 all between the first and the last, 2 the
+    last, and 3 those of number 1 in reverse order. If H depends on the time, the list ends with the advance of the
+    time.
 
     On a lattice of attracting bodies, ``relative`` may describe relative coordinates. Then the fields are transformed
     to these coordinates before the flows, and back after the flows.

@@ -163,7 +163,10 @@ def expanded(e: Any) -> Any:
 
 
 def _list_functions(expressions: Iterable[Any], functions: dict[Any, None]) -> None:
-    """Add the functions that occur in the expressions to ``functions``, each after those in its `_relation`."""
+    """Add the functions that occur in the expressions to ``functions``.
+
+    A function comes after the functions that occur in its `_relation`.
+    """
     for e in expressions:
         if e in functions or e.is_Rational:
             continue

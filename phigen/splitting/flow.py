@@ -30,10 +30,10 @@ from phigen.symbolic.tower import Poly, Tower
 #: Motions with special formulas for their flows. The formulas are proved by identities in independent symbols.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
-#: Methods for linear equations ẇ = Aw. CLOSED_FORMS: formulas for exp(tA). EXPONENTIALS: matrices exp(tA) that are
-#: computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if A depends on the state and has at most
-#: four rows. Functions try the methods in this order. The argument ``methods`` is the last method that a function may
-#: try.
+#: Methods for linear equations ẇ = Aw, where A is constant along the flow. CLOSED_FORMS: formulas for exp(tA) for
+#: special A. EXPONENTIALS: matrices exp(tA) that are computed as numbers before the steps. SMALL_MATRICES: formulas for
+#: exp(tA) for every A with at most four rows, even if A depends on the state. Functions try the methods in this order.
+#: The argument ``methods`` is the last method that a function may try.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
 #: Text in reports for linear equations that are solved by a matrix exponential, computed before the steps.

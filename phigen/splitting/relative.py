@@ -109,12 +109,12 @@ class RelativeMotions:
         return fold(roots, lambda e, args: by_node.get(id(e)) or rebuild(e, args))
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
+        """Yield pairs of a label and an expression. If all expressions vanish, the increments solve the equations of
         motion.
 
         ``spread`` converts changes of the relative coordinates Q_i, P_i to changes of Cartesian coordinates. The
         expressions with labels ``change of …`` vanish if ``spread`` is the inverse of the definitions of Q_i and P_i.
-        The other expressions are the identities of Kepler motions.
+        The other expressions vanish if the changes of Q_i and P_i are those of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)

@@ -99,8 +99,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # Formulas are shorter if numbers take the place of the parameters. But the series cannot represent roots of some
-    # numbers. Then the parameters remain symbols.
+    # Formulas are shorter if numbers take the place of the parameters. If the series cannot represent a root of these
+    # numbers, the parameters remain symbols.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for exact_values in (exact, {}):

@@ -40,7 +40,7 @@ class Method:
         return self.together(states, h) if self.together else np.array([self.step(x, h) for x in states])
 
     def after(self, h: float) -> Method:
-        """Return the method whose steps begin at a time later by h; this method if nothing depends on the time."""
+        """Return this method with its initial time increased by h; the same object if nothing depends on the time."""
         return self.later(h) if self.later else self
 
 

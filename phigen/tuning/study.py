@@ -30,8 +30,8 @@ CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: FINALISTS: number of best methods that are tested in longer runs and timed. BEHIND: largest cost of these methods, as
 #: a multiple of the least cost. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Multiple of the time budget after which no further method is confirmed by a longer run. If no method is confirmed by
-#: then, the runs continue until a method is confirmed. Each method then gets only one run.
+#: Multiple of the time budget after which no further method is confirmed by a longer run. If no method is confirmed at
+#: that time, further methods get one longer run each, until a method is confirmed.
 CONFIRMED = 1.0
 #: Multiple of the time budget after which no further round of timings begins. A round takes about a tenth of the
 #: budget.

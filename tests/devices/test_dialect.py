@@ -32,12 +32,12 @@ def test_all_objects_of_a_file_have_an_address_space(name):
 
 @pytest.mark.parametrize("line", ["double n_last;", "const double *n_rows[2] = { 0, 0 };", "static int n_calls = 0;"])
 def test_objects_without_an_address_space_are_errors(line):
-    with pytest.raises(ValueError, match="without address space"):
+    with pytest.raises(ValueError, match="without an address space"):
         qualified([DEVICES_ONLY, line], "n")
 
 
 def test_a_static_table_in_a_function_is_an_error():
-    with pytest.raises(ValueError, match="without address space"):
+    with pytest.raises(ValueError, match="without an address space"):
         qualified([DEVICES_ONLY, "static int n_f(void)", "{", "    static const int a[1] = { 0 };", "}"], "n")
 
 

@@ -262,7 +262,7 @@ REFUSED = {
     "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "attitude to truncation": (
         f"{BODY}reconstruct: quaternion\nscheme: gauss\nstructure: to truncation\n",
-        "no group element",
+        "needs the rotation that a step makes",
         "exact",
     ),
     "matrix": (f"{BODY}reconstruct: matrix\nscheme: gauss\n", "a quaternion, not a matrix", "quaternion"),

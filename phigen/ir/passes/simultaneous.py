@@ -10,9 +10,9 @@ from phigen.ir.walk import map_blocks
 
 
 def simultaneous(function: ir.Function) -> ir.Function:
-    """Return a sweep in which all increments are computed before any field is updated.
+    """Return the function with all increments of a sweep stored in variables before any field is updated.
 
-    Variables store the increments. The function is unchanged if it has a single increment, or if it is no sweep.
+    A function that is no sweep, or that has a single increment, is returned unchanged.
     """
     if not function.role.is_sweep:
         return function

@@ -42,10 +42,12 @@ def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[
         elif line.startswith(_TABLE):
             spelt[declaration.begin] = f"{name}_CONSTANT {line.removeprefix(_TABLE)}"
         else:
-            raise ValueError(f"{name}: an object without address space: {line}")
+            raise ValueError(f"{name}: a declaration without an address space, which is an error in phigen: {line}")
     for line in spelt[begin:]:
         if line.lstrip().startswith("static "):
-            raise ValueError(f"{name}: an object without address space: {line.strip()}")
+            raise ValueError(
+                f"{name}: a declaration without an address space, which is an error in phigen: {line.strip()}"
+            )
     for declared in _COEFFICIENTS if common else ():
         spelt[begin:] = [line.replace(declared, f"{name}_COEF {declared}") for line in spelt[begin:]]
     return spelt

@@ -10,9 +10,9 @@
 /* ---- SIMD batches of members: implicit steps ---- */
 enum {
     PHI_GROUP = PHI_LANES,              /* number of members of a group, one in each lane */
-    PHI_FEWEST = 3,                     /* smallest number of members that are faster together than one by one; measured */
+    PHI_FEWEST = 3,                     /* smallest number of members whose joint integration is faster; measured */
     PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* number of steps that repay a fit; measured. It is large, since a fit predicts one solution, not eight as in a block */
-    PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* slow steps until recurrences that did not help are fitted again */
+    PHI_REFIT_WAIT = 100 * PHI_REPAY    /* if recurrences did not help: number of steps that take several iterations until the next fit */
 };
 
 /* Members of an ensemble, one in each lane. */
@@ -134,7 +134,7 @@ static void phi_group_fit(phi_group *group)
     }
     ++group->fits;
     group->slow_steps = 0;
-    group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
+    group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_REFIT_WAIT;
 }
 
 /* In each lane whose prediction y is not near `last`, set y to `last`: from elsewhere, the iteration could find a solution

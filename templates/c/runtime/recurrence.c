@@ -14,7 +14,7 @@
 
 /* Largest accepted error of a recurrence for values to which it was not fitted, relative to the largest value. If the error
    is larger, the motion is chaotic or the step long, and other predictors are as good. */
-#define PHI_HOPELESS 1e-7
+#define PHI_MAX_FIT_ERROR 1e-7
 
 enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* number of equations of the least-squares problem */
 
@@ -93,6 +93,6 @@ static int phi_train(phi_history *history, int component)
         for (int j = k + 1; j < terms; ++j)
             for (int l = 0; l < 8; ++l) weight[k][l] -= r[j / 8][k][j % 8] * weight[j][l];
     for (int k = 0; k < WINDOW; ++k) memcpy(history->weight[k][component], weight[k], AHEAD * sizeof(double));
-    return phi_missed(value + ROWS, weight) <= PHI_HOPELESS * largest ? terms : 0;
+    return phi_missed(value + ROWS, weight) <= PHI_MAX_FIT_ERROR * largest ? terms : 0;
 }
 #endif

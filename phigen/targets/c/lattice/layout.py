@@ -47,7 +47,7 @@ class Layout(RowLayout):
 
     @property
     def step(self) -> Sweeps:
-        """The step of the lattice."""
+        """The record of the step, with its kernels and its schedule."""
         return self.lattice.step
 
     def bar(self, array: str) -> int:

@@ -120,7 +120,7 @@ class RowLoops:
         """Yield the loop after all passes that come before the lowering. In the profile ``fast``, there may be a second
         loop, for sites near open ends.
         """
-        full_range_doc = f"as {self.program.name}_{loop.name}_near, for arguments of any size"
+        full_range_doc = f"as {self.program.name}_{loop.name}_near, with functions for arguments of any size"
         doc = full_range_doc if form == "_full_range" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:
