@@ -67,6 +67,11 @@ class Backend(Protocol):
         ...
 
     @property
+    def has_ensemble(self) -> bool:
+        """Whether the solver was compiled with `ensemble`."""
+        ...
+
+    @property
     def has_pullback(self) -> bool:
         """Whether the solver was compiled with ``adjoint``, and so has `pullback`."""
         ...

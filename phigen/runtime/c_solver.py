@@ -103,8 +103,9 @@ class CSolver:
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        if not hasattr(self._c, "ensemble"):
-            raise TypeError(f"{self.interface.name} was compiled without ensembles: the spec has without: [ensemble]")
+        if not self.has_ensemble:
+            reason = "without: [ensemble], or the profile certified"
+            raise TypeError(f"{self.interface.name} was compiled without ensembles, because of {reason}")
         if not len(members) and members.alike:
             self._expect_parameters(members)
         if attitudes is not None:
@@ -253,6 +254,10 @@ class CSolver:
             gauge = self._gauge
             times_or_gauges = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
         return self._own(packed), times_or_gauges, self._own(np.full(count, members.h))
+
+    @property
+    def has_ensemble(self) -> bool:
+        return hasattr(self._c, "ensemble")
 
     @property
     def has_pullback(self) -> bool:

@@ -403,6 +403,10 @@ class NumpySolver:
         return ensemble(self.module, members, self._gauges(members.x0, members.parameters), attitudes)
 
     @property
+    def has_ensemble(self) -> bool:
+        return True
+
+    @property
     def has_pullback(self) -> bool:
         return hasattr(self.module, "pullback")
 

@@ -107,10 +107,19 @@ class Propagation:
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
         """Integrate all members, and return their final states (…, DIM) or, with a stride, all rows (…, rows, DIM)."""
         start, members, values = self._members(x0, parameters)
+        if isinstance(self.solver, Solver) and not self.solver.backend.has_ensemble:
+            rows = [self._rows(self.solver, x, {n: v[m] for n, v in values.items()}) for m, x in enumerate(members)]
+            return np.reshape(rows, self.shape(start))
         states = self.solver.ensemble(members, self.h, self.steps, self.stride, t0=self.t0, parameters=values)
         if self.stride is not None:
             states = np.moveaxis(states, 0, 1)
         return states.reshape(self.shape(start))
+
+    def _rows(self, solver: Solver, x: Floats, values: Mapping[str, float]) -> Floats:
+        """Return the last state (DIM,) of one member or, with a stride, its rows (rows, DIM)."""
+        stride = self.stride or max(1, self.steps)
+        states = solver.integrate(x, self.h, self.steps, stride, t0=self.t0, parameters=values).x
+        return states[-1] if self.stride is None else states
 
     def transposed(self, x0: ArrayLike, parameters: Values, cotangent: ArrayLike) -> tuple[Floats, dict[str, Floats]]:
         """Return the cotangents of x0 and of the parameters, in the shapes of x0 and parameters.

@@ -128,6 +128,17 @@ def test_second_derivatives_are_refused(solver, forward):
         jax.hessian(cubes(propagator(solver, forward=forward)))(X[0], 2.2)
 
 
+@pytest.mark.parametrize("stride", [None, 3])
+def test_members_of_a_solver_without_ensembles_are_integrated_one_by_one(solver, stride):
+    certified = phigen.compile(phigen.spec.loads(SYSTEM), adjoint=True, profile="certified")
+    x = np.array([[0.1, 0.8, 0.3], [0.2, -0.5, 0.4]])
+    actual, expected = (
+        jax.vmap(propagator(each, stride=stride))(jnp.asarray(x), {"I2": jnp.array([1.7, 2.2])})
+        for each in (certified, solver)
+    )
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-13)
+
+
 def test_failing_steps_raise(solver):
     with pytest.raises(Exception, match=r"NO_CONVERGENCE|NOT_FINITE"):
         propagator(solver)(1e6 * X[0])

@@ -271,6 +271,10 @@ class DeviceSolver:
         return self._host.restored(saved, parameters)
 
     @property
+    def has_ensemble(self) -> bool:
+        return True
+
+    @property
     def has_pullback(self) -> bool:
         return self._host.has_pullback
 
