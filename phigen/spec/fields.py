@@ -394,7 +394,7 @@ _BESIDE_RUNS = {
     "reconstruct": "reconstruct: is a key of the whole spec: write it beside runs:. The attitude starts as the "
     "identity; in Python, the argument attitude0= sets another start",
     "retry": "in Python, solver.integrate(…, retry=n) divides a step that fails into smaller steps",
-    "time": "start: is the time at which a run starts, until: the time at which it ends",
+    "time": "a run starts at the time `start`, and ends at the time `until`",
 }
 
 AVERAGE = Record(

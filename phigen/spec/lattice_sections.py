@@ -204,7 +204,12 @@ def _bonds(name: str, raw: Raw, declared: Declarations) -> tuple[tuple[int, int]
 def _names(name: str, raw: Raw, declared: Declarations) -> tuple[str, ...]:
     names = tuple(text for text in raw.get("names") or () if text is not None)
     if names and declared.relation == "grid":
-        _fail(name, "names", "names: only for sites of lattice: {pairs: all} and {graph: NAME}", declared)
+        _fail(
+            name,
+            "names",
+            "names: sites have names only with `lattice: {pairs: all}` or `lattice: {graph: NAME}`",
+            declared,
+        )
         return ()
     repeated = next((text for k, text in enumerate(names) if text in names[:k]), None)
     if repeated is not None:

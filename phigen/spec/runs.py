@@ -197,7 +197,7 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
     end = run_.start + run_.step * run_.steps if end is None else end
     if start_time is not None and (end - start_time) * run_.step < 0:
         place = declared.reader.locations["runs", run_.name, "average", "after"]
-        message = f"average: after: {float(start_time):.9g} is not before the end of the run, t = {float(end):.9g}"
+        message = f"average: `after: {float(start_time):.9g}` is not before the end of the run, t = {float(end):.9g}"
         declared.reader.problems.add(message, place, "give an earlier time; the rows from this time on are averaged")
 
 

@@ -115,7 +115,7 @@ def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tupl
         reason = f"sweeps average over whole steps, but the rows of the run {run.name} are at given times"
         return (
             f"{averages[0]}: {reason}",
-            "in the run, write stride: in place of every: or at:; or add frames: to the sweep",
+            "in the run, replace `every` or `at` by `stride`; or add `frames` to the sweep",
         )
     if averages and monitored and run.average.after is not None:
         reason = "the run has after:, a physical time, but sweeps with a monitor do not know physical times"

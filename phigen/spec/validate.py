@@ -196,7 +196,9 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not available for lattices", reader.locations[key,], hint)
     if raw.get("real") == "float" and raw.get("profile") == "fast":
-        problems.add("profile: real: float needs profile: small", reader.locations["profile",], "remove profile")
+        problems.add(
+            "profile: `fast` is not available with `real: float`", reader.locations["profile",], "remove profile"
+        )
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
         problems.add(message, reader.locations["structure",], "remove structure, or set scheme: gauss")

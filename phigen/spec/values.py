@@ -68,7 +68,7 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
             entries["random"][1], "random: sphere is only for all coordinates of a site together", _WHOLE_SPHERE
         )
     if mean is not None and kind == "sphere":
-        reader.error(mean, "mean: values of random: sphere always have the mean 0")
+        reader.error(mean, "mean: not available with `random: sphere`, whose values always have the mean 0")
         mean = None
     factor = Fraction(1) if scale is None else declared.number(scale, declared.numbers())
     around = declared.formula(mean, declared.site_numbers())

@@ -360,7 +360,7 @@ def test_names_are_for_graphs_and_pairs():
     text = "phigen: 1\nname: c\nlattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
     text += "hamiltonian: p**2/2 + q**2/2\n"
     text += "runs: {r: {sizes: [2], initial: {q: 0, p: 1}, names: [a, b], step: 0.1, steps: 2}}\n"
-    with pytest.raises(phigen.SpecError, match="names: only for sites of"):
+    with pytest.raises(phigen.SpecError, match="names: sites have names only with"):
         phigen.spec.loads(text)
 
 

@@ -96,7 +96,7 @@ def test_averages_from_a_time_after_the_end_are_refused(end, message):
         "phigen: 1\nname: o\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2 + q**2\n"
         f"observables: {{o: q*p}}\nruns: {{r: {{initial: [1, 0], step: 0.1, {end}, average: {{after: AFTER}}}}}}\n"
     )
-    with pytest.raises(phigen.SpecError, match=f"after: 3 is not before the end of the run, {message}"):
+    with pytest.raises(phigen.SpecError, match=f"`after: 3` is not before the end of the run, {message}"):
         phigen.spec.loads(text.replace("AFTER", "3"))
     assert float(phigen.spec.loads(text.replace("AFTER", "1.5")).runs["r"].average.after) == 1.5
 
