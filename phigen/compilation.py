@@ -448,7 +448,7 @@ class CompiledGauss(_CompiledSystem):
     def notes(self) -> list[str]:
         """Choices of the compiler, each as a line of text. A last line warns if steps are not Poisson maps."""
         defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
-        warned = [] if self.gauss.exact else [f"structure: to truncation: a step is not a Poisson map; {defect}"]
+        warned = [] if self.gauss.exact else [f"with `structure: to truncation`, a step is not a Poisson map; {defect}"]
         return [*super().notes, *warned]
 
     @property

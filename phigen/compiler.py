@@ -173,7 +173,7 @@ def _warn_of_written_out_lattice(spec: Spec) -> None:
     if lattice_spec is not None and lattice_spec.lattice is not None:
         sites = spec.dimension // len(lattice_spec.coordinates)
         message = f"{spec.name} is a lattice of {sites} identical sites, written out"
-        hint = f"phigen show --lattice {spec.file} prints a spec of one site, for any number of them"
+        hint = f"phigen show --lattice {spec.file} prints a spec of one site that is valid for any number of sites"
         place = replace(spec.diagnostic(("coordinates",), message, hint), severity="warning")
         warnings.warn(str(place), PhigenWarning, stacklevel=4)
 

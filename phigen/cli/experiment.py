@@ -120,7 +120,7 @@ def expect_system(spec: Spec) -> None:
 def run_of(spec: Spec, name: str | None) -> Run:
     """Return the run called ``name``, by default the first run. Raises `SpecError` if the spec has no runs."""
     if not spec.runs:
-        hint = "add one under runs:, with initial, step and steps; phigen new shows how"
+        hint = "under `runs`, add a run with `initial`, `step` and `steps`; phigen new writes a spec with a run"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
     run = spec.runs.get(name) if name else next(iter(spec.runs.values()))
     if run is None:

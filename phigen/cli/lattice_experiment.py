@@ -119,7 +119,7 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
     run, start = experiment.run, experiment.start
     assert start is not None
     if run.records_numbers and path.suffix.lower() == ".csv":
-        message = f"the run {run.name} has record: without state, and {path} has no state to continue from"
+        message = f"{path} contains no state to continue from: `record` of the run {run.name} does not list `state`"
         raise click.UsageError(f"--extend: {message}; store the run in a .npz file, which contains the last state")
     try:
         earlier_run = _past_of(path, run, solver.interface, start.state.shape)

@@ -67,7 +67,9 @@ def run_lattice(
     from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, errors_of, units_of
 
     if plot and plot.suffix.lower() in FILMS and run.records_numbers:
-        raise click.BadParameter("a film needs frames: the run has record: without state", param_hint="--plot")
+        raise click.BadParameter(
+            "a film needs states, but `record` of the run does not list `state`", param_hint="--plot"
+        )
     if plot and plot.suffix.lower() in FILMS:
         from phigen.drawing.films import expect_writer
 
@@ -218,7 +220,7 @@ def _expect_files(run: Run, start: Start, files: Mapping[str, Path | None]) -> N
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint=option) from None
         if path and path.suffix.lower() == ".zarr" and run.records_numbers:
-            message = "a .zarr holds frames, and the run has record: without state; its columns go to .csv or .npz"
+            message = "a .zarr file stores states, but `record` of the run does not list `state`; use .csv or .npz"
             raise click.BadParameter(message, param_hint=option)
 
 

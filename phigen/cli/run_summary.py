@@ -103,7 +103,7 @@ def print_averages(names: Sequence[str], averages: Averages, observables: Sequen
     printed.
     """
     if not averages.count:
-        out("\n  observables have no means: no row is stored within the times of average:")
+        out("\n  observables have no means: the time span that `average` selects contains no stored row")
         return
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")

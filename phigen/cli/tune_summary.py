@@ -21,6 +21,8 @@ _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
 #: A remark says that larger steps fail. It appears if the requested accuracy is more than this number times the error
 #: of the cheapest setting, and the step of this setting is nearly the largest one that was possible.
 _UNDECIDED_FACTOR = 20
+#: Keys of a run that the proposed lines of a run replace.
+_REPLACED_KEYS = "`step`, `stride`, `every`, `steps`, `duration` and `until`"
 #: _MOST_MONITORS: largest number of monitors in the table. _LEAST_GAIN: a monitor is proposed only if it reduces the
 #: number of steps by this factor, since each step with a monitor costs more. _FORMULA_LENGTH: number of characters to
 #: which formulas in the table are cut.
@@ -48,7 +50,7 @@ def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
     assert tuning.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
     out("\n".join(lines_of(tuning.winner)))
-    out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
+    out(f"\nand into its run {run.name}, instead of the keys {_REPLACED_KEYS}:\n")
     out("\n".join(f"    {line}" for line in run_lines_of(tuning, run)))
     if tuning.monitors:
         print_monitors(tuning.monitors, tuning, run)
@@ -80,7 +82,7 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
         best = gaining[0]
         out("\nTo paste into the spec" + ", instead of the lines above" * bool(tuning.winner) + ":\n")
         out("\n".join(monitored_lines(best)))
-        out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
+        out(f"\nand into its run {run.name}, instead of the keys {_REPLACED_KEYS}:\n")
         step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(tuning.horizon, run.step)
         out(f"    step: {step!r}\n    until: {end!r}")
     else:
