@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 79001c612016cf7a4b115c4ea0d58da7185c38e3b9e9bed89ffd511922477475
+ * body-sha256: 259e479fba128f093d8bd1dad7c138c3a34d5b0f19c92a192a11d92bb9ce928a
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -201,7 +201,7 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
     }
 }
 
-/* At each site, the increment of x by a stage, from y. */
+/* At each site, the increment of x in a stage with the solution y. */
 static inline void point_vortices_increment(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];

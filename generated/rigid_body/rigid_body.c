@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: caee359b1b1cb9bb8929188adf58a4612136b4111e98030735b4243b69b5b7f0
+ * body-sha256: 71cdf522795b04e016c61433e1ec25ab073a19433ac1593fd015a3cfb6afdbf9
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -716,7 +716,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 /* ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ---- */
 enum {
     rigid_body_SAMPLES = 32, /* number of sample states along a short piece of the trajectory */
-    /* degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H */
+    /* for H - f C with a Casimir C, degree of |pi grad S_3|^2 in f; S_3 is cubic in H */
     rigid_body_DEGREE = 6,
     /* largest number of rounds of the search; a round optimises each factor once */
     rigid_body_SWEEPS = 4,

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a6db7170c4669484d1e5bb3b181ec00f5bbcbab75a6523e79949735e6ddfc91d
+ * body-sha256: 233a54e3a8bf8e189a63cedb26af0aa58f850718cfc7bf2dd31b77f7b251bedf
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -475,7 +475,7 @@ const DIFFERENCES = 9;
 
 /** Number of sample states along a short piece of the trajectory. */
 const SAMPLES = 32;
-/** Degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H. */
+/** For H - f C with a Casimir C, degree of |pi grad S_3|^2 in f; S_3 is cubic in H. */
 const DEGREE = 6;
 /** Largest number of rounds of the search; a round optimises each factor once. */
 const SWEEPS = 4;

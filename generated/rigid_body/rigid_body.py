@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fb49f114c4bf4250896d43d6c7e3de353930bd22c42281e792980bb3196d7977
+# body-sha256: fc73ee2fa107ff17279879dcee8e02c03cdd8af12f45ca2a98c1c52ca7557641
 import numpy as np
 
 VERSION = "0.1.0"
@@ -556,7 +556,7 @@ def _advance(stage, x, carry, memory):
 
 
 SAMPLES = 32  # number of sample states along a short piece of the trajectory
-DEGREE = 6  # degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H
+DEGREE = 6  # for H - f C with a Casimir C, degree of |pi grad S_3|^2 in f; S_3 is cubic in H
 SWEEPS = 4  # largest number of rounds of the search; a round optimises each factor once
 GRIDS = 3  # number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before
 FIRST_REACH = 24  # points of the first grid on each side of its centre

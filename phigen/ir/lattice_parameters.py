@@ -99,7 +99,7 @@ def sums_of_derivatives(
         body = tuple(
             ir.Assign(_of(PARAMS_BAR, p, members), ir.entry(DERIVATIVES, k), adds=True) for k, p in enumerate(numbers)
         )
-        doc = "Add the derivatives by parameters with one value"
+        doc = "Add the derivatives with respect to those parameters that have one value for all sites"
         yield typed_function("add_numbers", doc, ("derivatives", "params_bar"), body, _TYPES)
     by_name = {p.name: p for p in parameters}
     calls = tuple(
@@ -107,7 +107,7 @@ def sums_of_derivatives(
         for name, bar in bars.items()
         for p in [by_name[name]]
     )
-    doc = "Add the derivatives by parameters at sites and bonds"
+    doc = "Add the derivatives with respect to those parameters that have a value at each site or bond"
     yield typed_function("add_arrays", doc, ("s", "bar", "params_bar"), calls, _TYPES)
 
 

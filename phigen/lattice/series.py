@@ -125,7 +125,7 @@ class SeriesPlan:
             coefficients,
             Role.RELAX,
         )
-        purpose = "at each site, the increment of x by a stage, from y"
+        purpose = "at each site, the increment of x in a stage with the solution y"
         advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
         slopes = coefficients.hoist(along(cell, values[:size]))
         slope = site_kernel(

@@ -147,7 +147,7 @@ class GaugeSearch(Policy):
     """The search for the multiples of Casimirs whose subtraction from H minimises the leading error of a step."""
 
     samples: int = count(32, "number of sample states along a short piece of the trajectory")
-    degree: int = count(6, "degree of |pi grad S_3|^2 as a polynomial in a factor; S_3 is cubic in H")
+    degree: int = count(6, "for H - f C with a Casimir C, degree of |pi grad S_3|^2 in f; S_3 is cubic in H")
     sweeps: int = count(4, "largest number of rounds of the search; a round optimises each factor once")
     grids: int = count(
         3, "number of grids in the search for a factor; the mesh of a grid is MESH times that of the one before"

@@ -462,8 +462,7 @@ SIDES = Choice(
 )
 
 ROWS = Choice(
-    "The row of a lattice with the number r, or the row of a segment. A lattice of a single row needs no number and no"
-    " offset.",
+    "Row number r of a lattice, or the row of a segment. A lattice of a single row needs no number and no offset.",
     ("ONE_ROW",),
     {
         "EACH_ROW": ("", "for (size_t r = 0; r < s->rows; ++r)"),

@@ -90,8 +90,8 @@ COTANGENT = (
     StateBlock(
         "x",
         members=(
-            "double x[PHI_DIM]; /* derivatives of L by the state */",
-            "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* derivatives of L by the coefficients */",
+            "double x[PHI_DIM]; /* derivatives of L with respect to the state */",
+            "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* derivatives of L with respect to coefficients */",
         ),
     ),
     StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state to which the derivatives x belong */",)),
@@ -100,7 +100,7 @@ COTANGENT = (
         "GAUSS",
         (
             "int chained; /* 1 if `after` has values, else 0 */",
-            "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* derivatives of L by unknowns of the next step */",
+            "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* derivatives of L with respect to unknowns of the next step */",
         ),
     ),
 )
@@ -146,10 +146,10 @@ TRANSPOSE = (
     StateBlock(
         "bar",
         members=(
-            "double *bar[PHI_BARS];      /* derivatives by fields, then by parameters at sites and at bonds */",
-            "double *row_bar[PHI_BARS];  /* as bar, but derivatives by one state that the run returned */",
+            "double *bar[PHI_BARS];      /* derivatives with respect to fields, then parameters at sites and bonds */",
+            "double *row_bar[PHI_BARS];  /* derivatives with respect to one state that the run returned */",
             "double *handed[PHI_HANDED]; /* contributions of sites to derivatives at their neighbours */",
-            "double *sums;               /* for each row segment, derivatives by the coefficients */",
+            "double *sums;               /* for each row segment, derivatives with respect to the coefficients */",
         ),
     ),
     StateBlock(

@@ -411,5 +411,5 @@ _TITLES = {
     Role.SLOPE: "Derivative of a sweep with respect to y, along v",
     Role.OWN_SLOPE: "Derivative of a sweep with respect to y at the site itself",
     Role.SIDE: "Derivative of a sweep with respect to x, along v",
-    Role.FOLLOW: "Derivative of the update of x at the end of a stage with respect to y, along v; it is added",
+    Role.FOLLOW: "Add to `to` the derivative of the increment of x with respect to y, along v",
 }
