@@ -44,7 +44,7 @@ def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
     if not centre:
         yield _named(f"the adjoint {algebra.dimension}×{algebra.dimension} matrices", algebra.dimension, adjoint, field)
         return
-    yield from _with_characters(algebra, adjoint, centre, field)
+    yield from _with_blocks(algebra, adjoint, centre, field)
     yield from _two_step(algebra, adjoint, field)
 
 
@@ -104,7 +104,7 @@ def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]
     return [rows[position] for position in sorted(rows)]
 
 
-def _with_characters(
+def _with_blocks(
     algebra: LieAlgebra, adjoint: list[Sparse], centre: list[dict[int, Scalar]], field: Field
 ) -> Iterator[Representation]:
     """Yield the adjoint representation, extended by 2×2 blocks (0 χ; 0 0) that make it faithful on the centre.
@@ -129,7 +129,7 @@ def _with_characters(
     for extra, form in enumerate(forms):
         for i, value in form.items():
             matrices[i][n + 2 * extra, n + 2 * extra + 1] = value
-    yield _named(f"the adjoint matrices and {len(forms)} nilpotent character(s)", n + 2 * len(forms), matrices, field)
+    yield _named(f"the adjoint matrices and {len(forms)} nilpotent 2×2 block(s)", n + 2 * len(forms), matrices, field)
 
 
 def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -> Scalar:

@@ -86,7 +86,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         increment,
         True,  # symmetric: β(x, p) = α(x, −p)
         explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
-        reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), where each 4 must be 2",
+        reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n); in the Cayley transform "
+        "of this example, the denominators 4 must be 2",
     )
 
 

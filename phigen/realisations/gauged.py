@@ -80,7 +80,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         is_symmetric(alpha, beta, system.coordinates),
         explanation=f"π is constant in other coordinates, π_ij = g_i A_ij g_j with the factors {factors or '1'}: the "
         "bi-realisation of the midpoint rule in these coordinates; symmetric",
-        reference=f"{PAPER}, the quadratic example, for any factors",
+        reference=f"{PAPER}, the quadratic example, with functions g_i(x_i) in place of the coordinates x_i",
     )
 
 

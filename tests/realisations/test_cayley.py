@@ -50,9 +50,9 @@ def test_gl3_contains_sl3_but_is_closed():
     assert proved(typed(family("gl", 3)))
 
 
-def test_toda_lattice_needs_the_characters_for_its_centre():
+def test_toda_lattice_needs_nilpotent_blocks_for_its_centre():
     s = system_from_spec(load(bundled_specs() / "toda3.yaml"))
-    assert "nilpotent character" in realise(s, CAYLEY).explanation
+    assert "nilpotent 2×2 block" in realise(s, CAYLEY).explanation
     assert proved(s)
 
 
