@@ -119,7 +119,7 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
             f"such that the other coordinates form an ideal; {algebra.name} has {count_text}",
-            "use reconstruct: matrix with scheme: series or splitting, for every algebra with known matrices",
+            "use `reconstruct: matrix`; it needs an algebra with known matrices, and `scheme: series` or `splitting`",
         )
     rotation, sign = triples[0]
     return Group(sign > 0, rotation, _vectors(algebra, rotation, sign), algebra.dimension)

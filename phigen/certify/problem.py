@@ -79,8 +79,8 @@ def _expect_covered(program: Program, spec: Spec) -> None:
     if program.single:
         refusals.append((("solver",), "certificates cover only C in double precision", "leave out real: float"))
     if with_frames(program) is not program:
-        message = f"certificates do not cover the form of Gauss steps that profile fast has at order {program.order}"
-        refusals.append((("order",), message, "set order: 12, or profile: small"))
+        message = f"certificates do not cover Gauss steps of order {program.order} with `profile: fast`"
+        refusals.append((("order",), message, "set `order: 12` or `profile: small`"))
     flows = {_FLOWS[e.op] for kernel in program.kernels for e in topological(kernel.roots) if e.op in _FLOWS}
     for flow in sorted(flows):
         hint = "scheme: series, or composition: suzuki, which splits the motion" if flow in _SPLIT else "scheme: series"

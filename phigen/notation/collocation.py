@@ -42,7 +42,7 @@ def lines(compilation: CompiledGauss) -> list[str]:
         shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
         description = unknowns if all(s.is_zero for s in part.shift) else ", ".join(shifts)
         in_ideal = (
-            f"; {part.unknowns} unknowns, since functionals replace the components of G in an ideal"
+            f"; G = g + n with n in an ideal; {part.unknowns} unknowns: g, and a linear functional in place of n"
             if part.ideal
             else ""
         )

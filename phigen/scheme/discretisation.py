@@ -182,7 +182,7 @@ def expect_noise(system: System, realisation: BiRealisation, order: Order, compo
     reason, hint = "", ""
     if not realisation.symmetric:
         reason = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
-        hint = "birealisation: auto; Stratonovich's integral is evaluated at the middle of a step"
+        hint = "use `birealisation: auto`; only a symmetric bi-realisation gives the integral of Stratonovich"
     elif composition not in ("auto", "none"):
         reason, hint = (
             "noise: steps are not composed, since some stages of a composition go back in time",

@@ -66,7 +66,7 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     inputs = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
     slope = Kernel(
         "reduced_field",
-        "the derivatives of the iterated unknowns of a stage, times its weight w, from integrals u of increments",
+        "the derivatives of the iterated unknowns at a stage, times its weight w; u are integrals of increments",
         {**inputs, "w": (WEIGHT,), "time": (TIME, LENGTH)},
         (Output("move", tuple(coefficients.hoist(values))),),
     )

@@ -96,7 +96,9 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
         return None
     message = ""
     if not isinstance(spec.monitor, str):
-        message = "monitor: with an expression g, K = g(H + e) does not split; scheme: splitting offers monitor: log"
+        message = (
+            "monitor: for an expression g, K = g(H + e) does not split; `scheme: splitting` has only `monitor: log`"
+        )
     elif spec.time:
         message = "monitor: not together with time: e = -H(x0) would not be constant"
     elif system.forces:
