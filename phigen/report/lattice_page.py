@@ -127,11 +127,11 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
     if material.spectrum:
         yield lyapunov_picture(material.spectrum)
 
-    flat = trajectory.x.ndim == 3
-    caption = "The fields over time, with the sites upwards" if flat else "The fields at some times"
-    if places_of(trajectory) is not None:
-        caption = "The fields at some times; distances are close to the number of bonds between sites"
+    flat, is_graph = trajectory.x.ndim == 3, places_of(trajectory) is not None
+    caption = "The fields over time, with the sites upwards" if flat and not is_graph else "The fields at some times"
     caption += ", and errors of conserved quantities, on a logarithmic scale."
+    if is_graph:
+        caption += " The distance of two sites in the figure is close to the number of bonds between them."
     worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
     title, run = "The fields over space and time", material.run
     names = run.lattice.names if run and run.lattice else ()
