@@ -167,7 +167,7 @@ def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
                 RecordKey(
                     "of",
                     _structure("of", nested - 1),
-                    "the Poisson structure in the new coordinates, which map: defines",
+                    "the Poisson structure in the new coordinates, which the key `map` defines",
                     required=True,
                 ),
                 RecordKey(
@@ -227,7 +227,8 @@ BIREALISATION = Record(
         RecordKey(
             "side",
             OneOf(("q", "p")),
-            "for canonical-euler: a step takes H at q of its start and p of its end (q), or the reverse (p)",
+            "for canonical-euler: with `q`, a step evaluates H at the initial q and the final p; with `p`, at the "
+            "initial p and the final q",
             default="q",
         ),
         RecordKey(
@@ -387,12 +388,12 @@ SOURCE = Record(
 #: Hints for words that users may write as keys of a run by mistake. A hint says where the setting belongs, or which key
 #: a run has instead.
 _BESIDE_RUNS = {
-    key: f"{key}: is a key of the whole spec: write it beside runs:, not in a run"
+    key: f"`{key}` is a key of the whole spec: write `{key}` beside `runs`, not in a run"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
 } | {
-    "tolerance": "solver: {tolerance: …} is a key of the whole spec: write it beside runs:, not in a run",
-    "reconstruct": "reconstruct: is a key of the whole spec: write it beside runs:. The attitude starts as the "
-    "identity; in Python, the argument attitude0= sets another start",
+    "tolerance": "`solver: {tolerance: …}` belongs to the whole spec: write `solver` beside `runs`, not in a run",
+    "reconstruct": "`reconstruct` is a key of the whole spec: write `reconstruct` beside `runs`, not in a run. The "
+    "initial attitude is the identity; in Python, the argument `attitude0` sets another initial attitude",
     "retry": "in Python, solver.integrate(…, retry=n) divides a step that fails into smaller steps",
     "time": "a run starts at the time `start`, and ends at the time `until`",
 }
@@ -590,11 +591,12 @@ SWEEP = Record(
 
 
 #: Hints for keys that stand at the top of a spec, but belong inside a run.
-_IN_RUNS = {f.key: f"{f.key}: is a key of a run: write runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
-_IN_RUNS["step"] += ". The key monitor: adapts steps to the motion"
-_IN_RUNS["precision"] = "order: sets the order of the method; real: float means single precision"
+_IN_RUNS = {f.key: f"`{f.key}` is a key of a run: write `runs: {{NAME: {{{f.key}: …}}}}`" for f in RUN.fields}
+_IN_RUNS["step"] += ". The key `monitor` adapts steps to the motion"
+_IN_RUNS["precision"] = "`order` sets the order of the method; `real: float` means single precision"
 _IN_RUNS["tolerance"] = (
-    "order: and step: determine the error of a step; solver: {tolerance: …} is for the equations of implicit steps"
+    "the keys `order` and `step` determine the error of a step; `solver: {tolerance: …}` is for the equations of "
+    "implicit steps"
 )
 
 SPEC = Record(

@@ -223,7 +223,7 @@ def _start(name: str, node: Scalar | None, declared: Declarations) -> Fraction:
             "start",
             "start: this system does not depend on the time",
             declared,
-            "add time: t to the spec, with the name of the time",
+            "add `time: t` to the spec, where t is the name of the time in your formulas",
         )
     return declared.number(node, declared.numbers()) or Fraction(0)
 

@@ -68,7 +68,7 @@ def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarati
         return False
     record = [node.text for node in raw.get("record") or () if node is not None]
     if record and "state" not in record:
-        add(f"{key} needs states, and record: does not name them", place, "record: [state, …], or no record")
+        add(f"{key} needs states, and `record` does not contain `state`", place, "record: [state, …], or no record")
         return False
     return True
 

@@ -118,8 +118,8 @@ def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> tupl
             "in the run, replace `every` or `at` by `stride`; or add `frames` to the sweep",
         )
     if averages and monitored and run.average.after is not None:
-        reason = "the run has after:, a physical time, but sweeps with a monitor do not know physical times"
-        return f"{averages[0]}: {reason}", "remove after: from the run"
+        reason = "`after` of the run is a physical time, but sweeps with a monitor do not know physical times"
+        return f"{averages[0]}: {reason}", "remove the key `after` from the run"
     return None
 
 
@@ -146,7 +146,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         declared.reader.error(
             key,
             "over: start: this system does not depend on the time",
-            "add time: t to the spec, with the name of the time",
+            "add `time: t` to the spec, where t is the name of the time in your formulas",
         )
         return []
     if isinstance(value, Scalar):
@@ -227,5 +227,8 @@ def _expect_sense(
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
     if "energy_error" in sweep.keep and declared.time:
-        hint = "store states by keep: [final] or by frames:; solver.hamiltonian(x, t) returns the energy of a state"
+        hint = (
+            "store states by `keep: [final]` or by the key `frames`; then solver.hamiltonian(x, t) returns the energy "
+            "of a state"
+        )
         _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared, hint)

@@ -202,7 +202,7 @@ def test_a_start_on_the_section_is_a_crossing_as_in_a_run():
     [
         ("steps: 60", "steps: 60, every: 0.4", "sweeps average over whole steps, but the rows of the run swing"),
         ("steps: 60", "steps: 60, at: [0.7, 2]", "sweeps average over whole steps, but the rows of the run swing"),
-        ("steps: 60", "steps: 60, average: {after: 2}", "the run has after:, .* with a monitor"),
+        ("steps: 60", "steps: 60, average: {after: 2}", "`after` of the run is a physical time, .* with a monitor"),
     ],
 )
 def test_averages_that_a_sweep_makes_of_other_rows_than_a_run_are_refused(old, new, reason):
