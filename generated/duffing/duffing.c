@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 6c9e872d02d3c7684730151923cfc851d859d2f626ea7ee5f9d5d4e2598e7bc9
+ * body-sha256: 587b5320976a2e105c4758dbd1782597186ee70e113f335113c7e5f7aa802233
  */
 #include "duffing.h"
 #include <float.h>
@@ -229,7 +229,7 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 }
 
 #define duffing_PLAUSIBLE 1.5         /* largest plausible increment, relative to |x| + |h dx/dt| */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of an increment beyond PLAUSIBLE */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* increments over PLAUSIBLE may change H by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 58265dc9d172b1249d901eed4416fda8360eadec5ace171e4b091900dc8a44c8
+ * body-sha256: e43dbd604777d988dcd5ac7a9967f288bf9bd2815c5b7dc22f15978b01a71010
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -186,7 +186,7 @@ const SHRINKING = 0.25;
 
 /** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of an increment beyond PLAUSIBLE. */
+/** Increments over PLAUSIBLE may change H by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

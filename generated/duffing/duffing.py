@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0c488267416d376160f1a39b5523627e6f21fad906d34cd6677d56b207e2f714
+# body-sha256: ad0b66c39d742f7961467bbd70499388be91c71508de6c4845bdd15d3e0bce20
 import numpy as np
 
 VERSION = "0.1.0"
@@ -215,7 +215,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

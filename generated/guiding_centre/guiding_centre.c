@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: c8af816da99593ff10587fd0c12fbe8ad20745997ae7aea963d60b8655d2ed2b
+ * body-sha256: c2a99f63abd9285b206a80fdfb4897378e241514da92dd93da67c6bce8824f64
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -49,7 +49,7 @@ static void guiding_centre_prepare(const guiding_centre_params *params, double h
     coef[4] = params->kappa;
 }
 
-/* The momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of the
+/* `slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of the
    equation for p up to O(h^2). */
 static void guiding_centre_generate(const double coef[5], const double y[4], double slope[4],
     double jacobian[16])
@@ -215,7 +215,7 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 }
 
 #define guiding_centre_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
-/* largest relative energy change of an increment beyond PLAUSIBLE */
+/* increments over PLAUSIBLE may change H by at most this fraction */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

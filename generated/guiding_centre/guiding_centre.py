@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 572b99406cfd8919ff28256c1b95150f1b4d65b1eeea814fb4007a8ab53599ea
+# body-sha256: 87d42c522e786f32c4e9ebc7b0485d9967f8a6542f11520fa38a8335034f2f3a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -130,7 +130,7 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """The momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of
+    """`slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of
     the equation for p up to O(h^2)."""
     x = y[..., 0]
     y_ = y[..., 1]
@@ -470,7 +470,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

@@ -8,7 +8,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dbb17f568367fc0a141b5cfe47c0f97872844137fa4c05b05b14a06b9d1d191b
+# body-sha256: 4b02027ec1b9eb06f90c0dad69fcb92c008368789ff3b9e3407c429241b6d78c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -277,7 +277,7 @@ def integrate(x0, h, steps, stride=1, gauge=None, times=False, **parameters):
 
     x0 has the shape (..., DIM); each index of its leading axes is a member, that is a trajectory. h and parameters
     may be arrays with one number for each member.
-    gauge replaces the energy level e = -H(x0). For a fixed e, a step is a Poisson map.
+    The argument gauge is the energy level e; if it is not given, e = -H(x0). For a fixed e, a step is a Poisson map.
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step of a member fails.
     """
     x, h, values = _checked(x0, h, steps, stride, parameters)

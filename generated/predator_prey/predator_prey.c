@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 15176598be89c47ce26f3157103c309fb857d60fe0ba6e4b35f8ca3c91d78621
+ * body-sha256: b38dc0811d670207d934957245c70e50d68281aaa4a8f6da2701fc3ab020e3e4
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -203,7 +203,7 @@ static void predator_prey_remember(predator_prey_history *history, const double 
 }
 
 #define predator_prey_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
-/* largest relative energy change of an increment beyond PLAUSIBLE */
+/* increments over PLAUSIBLE may change H by at most this fraction */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1cd8dd80e5d01459002cf830ec67847dd9e8dec50fc8199e80484dfc19982d39
+# body-sha256: 628767a9a3eeb4f94e91550db8d896e15636f34e8e204a67fd0b62d3907cf0c8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -209,7 +209,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: a8f12ce9359c5167afa2db0a298c6acec1cf7ea558d8df4d34ed30552e9e2c6d
+ * body-sha256: bba9ef0461f2a9794695e8f96b42dc821ebd6a597f9094849f95ec69aa226b36
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -107,7 +107,7 @@ static void quaternion_top_prepare(const quaternion_top_params *params, const do
     coef[46] = 2.0 / 3.0 * t50;
 }
 
-/* The momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of the
+/* `slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of the
    equation for p up to O(h^2). */
 static void quaternion_top_generate(const double coef[47], const double y[7], double slope[7],
     double jacobian[49])
@@ -380,7 +380,7 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
 }
 
 #define quaternion_top_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
-/* largest relative energy change of an increment beyond PLAUSIBLE */
+/* increments over PLAUSIBLE may change H by at most this fraction */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

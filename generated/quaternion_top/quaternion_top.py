@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ddf6087853f8057ffd89691c02ea90577b80938b9e2b4040a1a67f5158388019
+# body-sha256: 06f8f17dd904791ff00c7aa96b0eaf6b9af56020f2e33eb0aeb5eaba2dfd668f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -231,7 +231,7 @@ def _prepare(parameters, gauge, h):
 
 
 def _generate(coef, y):
-    """The momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of
+    """`slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of
     the equation for p up to O(h^2)."""
     m1 = y[..., 0]
     m2 = y[..., 1]
@@ -808,7 +808,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 71cdf522795b04e016c61433e1ec25ab073a19433ac1593fd015a3cfb6afdbf9
+ * body-sha256: 6508cd7b9e2976ff4bad1d3bb833cdc2aaade81dbe169afeea3193cfb10d0973
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -634,7 +634,7 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
 }
 
 #define rigid_body_PLAUSIBLE 1.5         /* largest plausible increment, relative to |x| + |h dx/dt| */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative energy change of an increment beyond PLAUSIBLE */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* increments over PLAUSIBLE may change H by at most this fraction */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */

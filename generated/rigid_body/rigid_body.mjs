@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 233a54e3a8bf8e189a63cedb26af0aa58f850718cfc7bf2dd31b77f7b251bedf
+ * body-sha256: b65b16a81143c29c59cb9ed7bc9f7b65a3a91fb50f32d8480a91e59764ad5b19
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -465,7 +465,7 @@ const SHRINKING = 0.25;
 
 /** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of an increment beyond PLAUSIBLE. */
+/** Increments over PLAUSIBLE may change H by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

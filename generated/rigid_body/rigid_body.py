@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fc73ee2fa107ff17279879dcee8e02c03cdd8af12f45ca2a98c1c52ca7557641
+# body-sha256: c4d68b2d919edd1bd090fd5d0e48c8f9dda2f92d4988c87f32b57ca43a4ede5b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -461,7 +461,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: b26f063debe2e3db7e22b869d50dc82809a37cd69f3f5db12d0e87f1cdcf2b3c
+ * body-sha256: fcb06ee693a1ff1ad9c18ec57445ef3a338338bd01f78ebc425ce5e23a588c27
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -257,7 +257,7 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
 }
 
 #define thermal_spin_PLAUSIBLE 1.5 /* largest plausible increment, relative to |x| + |h dx/dt| */
-/* largest relative energy change of an increment beyond PLAUSIBLE */
+/* increments over PLAUSIBLE may change H by at most this fraction */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2650706337b3a7d3696a44d59e1e6ed682c1792416fa966a1dcd37c524b1a387
+ * body-sha256: 2b125300a6160ad6ab4ac3a65750dae4fd7fbe51904c656263b75b6cefd991f6
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -284,7 +284,7 @@ const SHRINKING = 0.25;
 
 /** Largest plausible increment, relative to |x| + |h dx/dt|. */
 const PLAUSIBLE = 1.5;
-/** Largest relative energy change of an increment beyond PLAUSIBLE. */
+/** Increments over PLAUSIBLE may change H by at most this fraction. */
 const MAX_ENERGY_CHANGE = 0.5;
 
 /** Largest relative distance of a prediction from the last solution. */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6499420671cef4f07f618c62edd9496ffe19a52241af87ed0afdd3b772349779
+# body-sha256: e2a499e74225065b40b29a65faa2574165e5d834df865bbd4e4571cd2dd6b225
 import numpy as np
 
 VERSION = "0.1.0"
@@ -303,7 +303,7 @@ def _solve(matrix, side):
 
 
 PLAUSIBLE = 1.5  # largest plausible increment, relative to |x| + |h dx/dt|
-MAX_ENERGY_CHANGE = 0.5  # largest relative energy change of an increment beyond PLAUSIBLE
+MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most this fraction
 
 
 def _plausible(stage, x, end):

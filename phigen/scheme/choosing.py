@@ -201,7 +201,10 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
             f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} to depend only on coordinates "
             "that commute"
         )
-        hint = "write coordinates_from: jacobi, which makes such a B, or composition: wisdom-holman-17, for any B"
+        hint = (
+            "use `coordinates_from: jacobi`, with which B depends only on positions, or "
+            "`composition: wisdom-holman-17`, which allows every B"
+        )
         raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
     return replace(choice, splitting=SplitHamiltonian((modified, large_flow), kick=0, small=0))
 

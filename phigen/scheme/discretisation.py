@@ -242,7 +242,7 @@ def _composed(
             else f"composition {name} needs a symmetric bi-realisation; {realisation.kind} is not"
         )
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
-        raise SpecError([Diagnostic(reason, place, "composition: none uses the series without a composition")])
+        raise SpecError([Diagnostic(reason, place, "`composition: none` selects the series without a composition")])
     note = f"composition: {composition.name}, {len(composition.fractions)} stages of order 2"
     return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, composition.fractions, note)
 

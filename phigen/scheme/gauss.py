@@ -38,7 +38,8 @@ MAX_SWEEPS = 100
 
 #: Hint in the error for a bracket for which phigen knows no Gauss method that is exactly a Poisson map.
 TRUNCATION_HINT = (
-    "structure: to truncation applies to every bracket, but its steps are not Poisson maps; those of scheme: series are"
+    "use `structure: to truncation`, whose steps are not Poisson maps, or `scheme: series`, whose steps are Poisson "
+    "maps"
 )
 
 
@@ -105,10 +106,7 @@ def _other_coordinates(system: System) -> str:
     linear combinations of the coordinates. For any other π, the result is "".
     """
     if isinstance(system.shape, LiePoisson | Affine):
-        return (
-            "in a basis with fewer structure constants, such as those of lie_algebra: NAME, such a map may be known; "
-            "otherwise "
-        )
+        return "try a basis with fewer structure constants, such as the basis of `lie_algebra: NAME`; otherwise "
     entries = [entry for row in system.poisson for entry in row]
     terms = coordinate_terms(system.coordinates, entries)
     if terms is not None and all(sum(powers) == 2 for monomials in terms for powers in monomials):
@@ -273,7 +271,7 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
         yield f"structure: exact; a step is a Poisson map, since {group_names} {form}"
     elif realisation.logarithms:
         group_names = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
-        reason = f"brackets are constant with the logarithms of {group_names}"
+        reason = f"the brackets become constant if logarithms replace {group_names}"
         yield f"structure: exact; a step is a Poisson map, since {reason}"
     else:
         yield "structure: exact; a step is a Poisson map, since the brackets are constant"

@@ -72,7 +72,7 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     )
     follow = Kernel(
         "followers",
-        "unknowns of a stage that follow from integrals u of the increments of other unknowns",
+        "compute unknowns of a stage from u, the integrals of other unknowns from the start of the step to the stage",
         {**inputs, "time": (TIME, LENGTH)},
         (Output("offsets", tuple(coefficients.hoist(offsets))),),
     )

@@ -232,7 +232,7 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
     flat = coefficients.hoist([*generating.slope, *jacobian])
     return Kernel(
         "generate",
-        "the momenta p = grad S_h(y) as slope, and 1 - Hess S_h(y) pi(y) / 2 as jacobian: the Jacobian of the equation "
+        "`slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of the equation "
         "for p up to O(h^2)",
         {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),

@@ -81,7 +81,9 @@ def monitor_of(spec: Spec) -> Expression | None:
             message = f"monitor: not together with {obstacle}"
             raise SpecError([spec.diagnostic(("monitor",), message, EXTENDED_SYSTEM_HINT if spec.time else "")])
     if spec.forces and not isinstance(spec.gauge, str):
-        message = "gauge: with a monitor and forces no Casimirs are subtracted, since steps are not those of K"
+        message = (
+            "gauge: with a monitor and forces, no Casimirs are subtracted, since steps do not follow K = g (H + e)"
+        )
         raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])
     if isinstance(spec.monitor, str):
         hint = "scheme: splitting, or dt/dtau as an expression in the coordinates"

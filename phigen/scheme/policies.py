@@ -139,7 +139,7 @@ class PlausibilityPolicy(Policy):
     """
 
     plausible: float = number(1.5, "largest plausible increment, relative to |x| + |h dx/dt|")
-    max_energy_change: float = number(0.5, "largest relative energy change of an increment beyond PLAUSIBLE")
+    max_energy_change: float = number(0.5, "increments over PLAUSIBLE may change H by at most this fraction")
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def _of_pullback(program: Program, step: Step) -> dict[str, object]:
     """Return the values for the templates of the reverse pass through a step."""
     rows = len(step.flow_schedule.times) if step.flow_schedule else 1
     moment = ", t0 + done * h, h" if step.flow_schedule else ""
-    said = "the energy level e is\n    computed from x0 and the parameters, unless a gauge is given."
+    said = "the energy level e is\n    computed from x0 and the parameters, unless the argument gauge sets e."
     return {
         "parameters": len(program.parameters),
         "levels": int(program.monitor is not None),

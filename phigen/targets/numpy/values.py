@@ -20,7 +20,9 @@ _NOISE_ARGUMENTS = """
 #: time tau of a monitor.
 _OF_GAUGE = """gauge (one factor for each Casimir in GAUGE) replaces the factors that gauge() returns. For a fixed
     gauge, a step is a Poisson map."""
-_OF_LEVEL = "gauge replaces the energy level e = -H(x0). For a fixed e, a step is a Poisson map."
+_OF_LEVEL = (
+    "The argument gauge is the energy level e; if it is not given, e = -H(x0). For a fixed e, a step is a Poisson map."
+)
 _OF_TAU = """
 
     h is the size of a step in the time tau. With times=True, the result is a pair: the states, and an array (rows, ...)
