@@ -166,7 +166,8 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     """
     names = solver.interface
     if experiment.run.record:
-        message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"
+        reason = "has the key `record`, and the file of the run lacks values that a continuation needs"
+        message = f"the run {experiment.run.name} {reason}"
         raise click.UsageError(f"--extend: {message}; --from continues from a file that has the state")
     stored = past_of(path, names, "--extend")
     expected = [name for column in columns_of(names) for name in column.names]

@@ -77,7 +77,7 @@ def command(
     if examination.refuted:
         raise CheckError(refutation(examination))
     if examination.compilation is None:
-        raise examination.obstacle or AssertionError("the examination has neither a compilation nor an obstacle")
+        raise examination.obstacle or AssertionError("the spec was neither compiled nor refused")
     console.note(f"{spec.name}: {len(examination.statements)} statements examined, none refuted")
     command_line = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     if spec.lattice:
