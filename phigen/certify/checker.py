@@ -349,7 +349,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
         errors += [missed(worst_of(v)) + U * Y * solves for v in before]
-        demand(bool(errors), "a rule that ends the iteration bounds no error")
+        demand(bool(errors), "an iteration may end with an error of any size")
         e = each(arb.max, e, reduce(lambda a, b: each(arb.min, a, b), errors))
     rest, small, x_u = missed(e), column([ZERO] * n), A.inv() * (d_x - based * identity(m) if based else d_x)
     if stage["gain"]:

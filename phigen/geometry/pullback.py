@@ -53,7 +53,7 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
     if not statement.holds:
         detail = f"{statement.detail}; residual {statement.residual}"
         raise SpecError(
-            [Diagnostic(f"pullback: the functions of inverse: do not invert the functions of map: ({detail})")]
+            [Diagnostic(f"pullback: the functions under `inverse` are not the inverse of those under `map` ({detail})")]
         )
     columns = [derivatives(form.map, c) for c in coordinates]
     return Coordinates(form.map, backward, inverse_matrix([list(row) for row in zip(*columns, strict=True)]))

@@ -183,7 +183,7 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
         if turning.factors or not bodies or not statement.holds:
             yield stated if statement.holds else statement
         if bodies:
-            name = f"the element of the free body of H_{k} rotates with ∇H_{k}, hence g₁ = {order.format(k=k)}"
+            name = f"the group element of the free body in H_{k} has the angular velocity of the body"
             yield decide_zero(name, [*_weights(turning, group), *free_bodies.identities()], system.positive)
         if group.matrices and turning.factors:
             yield exponential_statement(system, group, turning, f"the matrix of the flow of H_{k} is exp(t∇H_{k})")

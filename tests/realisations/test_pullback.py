@@ -92,7 +92,7 @@ def test_without_a_formula_the_inverse_is_asked_for():
 
 def test_a_given_inverse_is_checked():
     mapping = "{u: (x + y)**2, v: y, w: z}"
-    with pytest.raises(SpecError, match=r"inverse: do not invert the functions of map: \(x"):
+    with pytest.raises(SpecError, match=r"`inverse` are not the inverse of those under `map` \(x"):
         pulled(SO3, mapping, "{x: u - v, y: v, z: w}")
 
 
