@@ -141,9 +141,10 @@ def singularity_plate() -> Plate:
     passing = int(course.end / COARSE) + 1
     finite = np.flatnonzero(np.isfinite(rk2_rows).all(axis=1))[-1]
     findings = (
-        Finding("T_sing", "≃ 0.23", course.end),
-        Finding("PHI-1, step 0.001: last step, in steps before T_sing", "the last step before", _left(course, stopped)),
-        Finding("PHI-1, step 0.0001: last step, in steps before T_sing", "the last step before",
+        Finding("T_sing, the time of the singularity", "≃ 0.23", course.end),
+        Finding("PHI-1, step h = 0.001: (T_sing − t)/h at the last state", "the last step before",
+                _left(course, stopped)),
+        Finding("PHI-1, step h = 0.0001: (T_sing − t)/h at the last state", "the last step before",
                 (course.end - fine) / (COARSE / 10)),
         Finding("RK2, step 0.001: x1 after T_sing is passed", "misses the singularity", float(rk2_rows[passing, 0])),
         Finding("RK2, step 0.001: overflow, in steps after T_sing", "–", -_left(course, finite * COARSE) + 1),
