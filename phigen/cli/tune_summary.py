@@ -22,7 +22,7 @@ _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
 #: of the cheapest setting, and the step of this setting is nearly the largest one that was possible.
 _UNDECIDED_FACTOR = 20
 #: Keys of a run that the proposed lines of a run replace.
-_REPLACED_KEYS = "`step`, `stride`, `every`, `steps`, `duration` and `until`"
+_REPLACED_KEYS = "`step`, `stride`, `every`, `at`, `steps`, `duration` and `until`"
 #: _MOST_MONITORS: largest number of monitors in the table. _LEAST_GAIN: a monitor is proposed only if it reduces the
 #: number of steps by this factor, since each step with a monitor costs more. _FORMULA_LENGTH: number of characters to
 #: which formulas in the table are cut.

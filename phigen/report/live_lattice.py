@@ -71,7 +71,7 @@ def gathered_lattice(
     if compilation.spec.noise:
         return LatticeLive({}, why_not=NOISE)
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
-        return LatticeLive({}, why_not="the lists of its start are too long for a page")
+        return LatticeLive({}, why_not="the lists of initial values, parameters and bonds are too long for a page")
     by_order, why_not = solvers(compilation, scheme, orders, _with_invariants(compilation))
     return LatticeLive(by_order, run, None, why_not, start=start, formulas=_formulas(compilation.spec, run))
 

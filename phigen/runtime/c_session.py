@@ -130,7 +130,7 @@ class CSession:
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         if parameters and not hasattr(self._c, "set_parameters"):
-            raise TypeError("the solver was compiled without set_parameters: the spec has without: [parameters]")
+            raise TypeError("the solver was compiled without set_parameters: the spec has `without: [parameters]`")
         with np.errstate(over="ignore"):
             values = np.array(list(parameters.values()), dtype=self._real)
         status = self._c.set_parameters(self.address, values.ctypes.data) if parameters else 0

@@ -104,7 +104,7 @@ class CSolver:
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         if not self.has_ensemble:
-            reason = "without: [ensemble], or the profile certified"
+            reason = "`without: [ensemble]` or `profile: certified`"
             raise TypeError(f"{self.interface.name} was compiled without ensembles, because of {reason}")
         if not len(members) and members.alike:
             self._expect_parameters(members)
