@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 587b5320976a2e105c4758dbd1782597186ee70e113f335113c7e5f7aa802233
+ * body-sha256: 31964c9d81cce02f31d53e46a587b2b43fe4196d24a044407ad16d9fa9a05b47
  */
 #include "duffing.h"
 #include <float.h>
@@ -206,7 +206,7 @@ static int duffing_predict(const duffing_history *history, double value[duffing_
     return history->order > 0 && distance <= duffing_REACH * size;
 }
 
-/* Update the predictor with a solution; difference[k] is then the error of a prediction by k entries. */
+/* Update the predictor. difference[k] becomes the solution minus the sum of the first k old differences. */
 static void duffing_remember(duffing_history *history, const double value[duffing_DIM])
 {
     double least = HUGE_VAL, next[duffing_DIM];

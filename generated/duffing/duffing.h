@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ac01ba7a2e834e86c28721446651441ef4757e0d7389871256b480576efbe2a5
+ * body-sha256: 260829a76c39eab408b55754ba863a47bd5e2c54037b2943c859103f6616778f
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -73,8 +73,8 @@ duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 

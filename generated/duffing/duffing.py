@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ad0b66c39d742f7961467bbd70499388be91c71508de6c4845bdd15d3e0bce20
+# body-sha256: 6790174663fe4cc98f000bfa4e55c3a608d6971680a70c515677f5c9476b6681
 import numpy as np
 
 VERSION = "0.1.0"
@@ -219,7 +219,7 @@ MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most thi
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
+    """Return for which members the increment `end` - `x` is plausible: it is short, or changes the energy little.
 
     If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
     the motion.

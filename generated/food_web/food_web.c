@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 090f4ac6724f842547be4cc71666c6d9d42aedc5a32d2fa870e79658846405c2
+ * body-sha256: afd35e9ad247140c804a349ef3cdccb508b7af1872e78d22b9d590e21e35f3e7
  */
 #include "food_web.h"
 #include <limits.h>
@@ -42,7 +42,7 @@ static int food_web_part_of_flow(const food_web_solver *s, int *flow)
     return part;
 }
 
-/* Duration of a flow, in steps, for each row of coefficients; the last merges two flows. */
+/* Durations of flows as fractions of a step, by row of coefficients. The last row is for two merged flows. */
 static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -50,7 +50,7 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* For each row of coefficients, its flows: 0 the first, 1 the inner, 2 the last, 3 the inner in reverse. */
+/* Flows that use each row of coefficients: 0 = first of a stage, 1 = inner, 2 = last, 3 = inner reversed. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
@@ -183,7 +183,7 @@ static inline void food_web_gather1(const double *coef, const food_web_row *row,
     }
 }
 
-/* The flow of H_1 = sum(x - k*log(x)): x multiplied by a factor. */
+/* The flow of H_1 = sum(x - k*log(x)): field x multiplied by a factor. */
 static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 {
     const double c0 = coef[0];
@@ -348,7 +348,7 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
     if (values != NULL) food_web_put(s, rows, values);
 }
 
-/* Copy the parameters at sites into rows. */
+/* Copy the parameters that may vary between sites to arrays of the solver. */
 static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
 {
     food_web_put_parameter(s, s->x[1], params->k, 1.0);
@@ -499,7 +499,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    /* if s->open, continue from the state before the last flow; the next flow includes it */
+    /* if s->open, take the last flow out of x: this flow is merged with the first flow of the next step */
     food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* makes the last flow; s->before stays without it */

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1d063bf115f4dbdd5a31378b995eee52634205fa13a615dd4fd282b83a9bc6cc
+ * body-sha256: b161a98329a1c1f751007e2d940cbe282f263020b9ccfa31ef25c519f294d8e6
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -48,7 +48,7 @@ typedef struct {
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
+    size_t full_range; /* the next `full_range` steps use slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */
     double h; /* size of the last step */

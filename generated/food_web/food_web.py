@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 9d85a09314731c0d2d585b9e7cea7b1473c09ccc66560574bdf2ca395c4e56ee
+# body-sha256: 20b370b31b9c08be349789641f0fb74fca406094986cca177fe0f1d529f74fe5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -35,7 +35,7 @@ PERIODS = (1,)
 
 # The durations of the flows or stages of a step, as fractions of the step: one for each row of coefficients.
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
-# The flows or stages of a step in order, each as (part of H, row of coefficients).
+# The flows of a step in order, each as (number, row of coefficients). BY_COLOUR explains the numbers.
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
 
 
@@ -105,9 +105,10 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """Return 1 at sites whose neighbours from offset low to offset high along each axis exist, else 0.
+        """Return 1 at sites whose neighbours from offset `low` to offset `high` along each axis exist, else 0.
 
-        bounds lists low and high for each axis. Neighbours beyond an open end do not exist.
+        The arguments are `low` and `high` for the first axis, then for the next axis, and so on. Neighbours beyond an
+        open end do not exist.
         """
         if bounds not in self._known:
             there = np.ones(self.sizes)

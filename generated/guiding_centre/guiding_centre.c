@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: c2a99f63abd9285b206a80fdfb4897378e241514da92dd93da67c6bce8824f64
+ * body-sha256: d3e75fecdfb391c7f8e2f0b7dfa28fabeede27061592b2431d9d65234c2d1fcc
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -49,8 +49,8 @@ static void guiding_centre_prepare(const guiding_centre_params *params, double h
     coef[4] = params->kappa;
 }
 
-/* `slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of the
-   equation for p up to O(h^2). */
+/* Compute the momenta `slope` = grad S_h(y), and `jacobian` = 1 - Hess S_h(y) pi(y) / 2, which differs by
+   O(h^2) from the Jacobian of the equation for p. */
 static void guiding_centre_generate(const double coef[5], const double y[4], double slope[4],
     double jacobian[16])
 {
@@ -192,7 +192,7 @@ static int guiding_centre_predict(const guiding_centre_history *history, double 
     return history->order > 0 && distance <= guiding_centre_REACH * size;
 }
 
-/* Update the predictor with a solution; difference[k] is then the error of a prediction by k entries. */
+/* Update the predictor. difference[k] becomes the solution minus the sum of the first k old differences. */
 static void guiding_centre_remember(guiding_centre_history *history, const double value[guiding_centre_DIM])
 {
     double least = HUGE_VAL, next[guiding_centre_DIM];

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 87d42c522e786f32c4e9ebc7b0485d9967f8a6542f11520fa38a8335034f2f3a
+# body-sha256: 914ed5961131d438dfa7a4e62a3227f37b25ba73a131d7350c715678a829ae42
 import numpy as np
 
 VERSION = "0.1.0"
@@ -130,8 +130,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """`slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of
-    the equation for p up to O(h^2)."""
+    """Compute the momenta `slope` = grad S_h(y), and `jacobian` = 1 - Hess S_h(y) pi(y) / 2, which
+    differs by O(h^2) from the Jacobian of the equation for p."""
     x = y[..., 0]
     y_ = y[..., 1]
     z = y[..., 2]
@@ -474,7 +474,7 @@ MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most thi
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
+    """Return for which members the increment `end` - `x` is plausible: it is short, or changes the energy little.
 
     If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
     the motion.

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d50ebf6caf6111d6a9d05fbf3175d9bb076b2b63ca89af99ada7b1e68c633857
+ * body-sha256: 2d439cd0b192f120e14d82b936473eca04328a5e18972ce822b3b38b44921f1c
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -40,7 +40,7 @@ typedef struct {
     double *before[heisenberg_DIM]; /* copies of the fields, to restore them if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
+    size_t full_range; /* the next `full_range` steps use slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */
     double h; /* size of the last step */

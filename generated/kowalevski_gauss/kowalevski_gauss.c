@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 0ab5c6ef4b55a99399785e3e684a9fce5c26ea82687763c64373d2a4e6c87fe7
+ * body-sha256: 2c42a3e98c8b1b5a544c15a821c0cc3305c68a75e3e311b4cc542529b2c71039
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -331,8 +331,8 @@ static void kowalevski_gauss_stage_field_lanes(const double coef[1], const doubl
     }
 }
 
-/* Replace the derivatives `k` of the unknowns of a step that ends at `z` by derivatives for the next step, in
-   all lanes. */
+/* At the end of a step, where the unknowns are `z`, transform their derivatives `k` for the next step, in all
+   lanes. */
 static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double x[6], const double z[8],
     kowalevski_gauss_lanes k[restrict 8], kowalevski_gauss_lanes seen[restrict 8])
 {
@@ -603,8 +603,8 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the last change is about the error before the last sweep: if it is small, this sweep was
-                   not needed */
+                /* the change by this sweep is nearly the error before the sweep; if the change is small, the
+                   sweep was not needed */
                 if (solved)
                     past->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED
                     ? sweep - 1 : sweep;

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2a02e6f45fd82c62610da0b13f4dbd793fc85d4b1bdbfe6be2c12a559c722bd7
+ * body-sha256: 414a5ece7bc0314022fe05ff46e84f4bdc59eba92ab677d165118693f9e59f21
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -92,8 +92,8 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
     size_t count, double *x);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

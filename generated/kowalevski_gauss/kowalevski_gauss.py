@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 90f1f34d0499059746d5a38de017b087dd55f39b3998ca560a77a047a11ab9d1
+# body-sha256: 6eb3fb7b6be897a95b957f41967eaa95a125804782ea50440276fe078d1ade0e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -178,8 +178,8 @@ def _stage_change(coef, x, z):
 
 
 def _next_frame(coef, x, z, k):
-    """Replace the derivatives `k` of the unknowns of a step that ends at `z` by derivatives for the
-    next step."""
+    """At the end of a step, where the unknowns are `z`, transform their derivatives `k` for the next
+    step."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6cf1a217351d184df1a8f8847deaf637c2316c64b77db3c6bc8106a2395a2eb2
+ * body-sha256: 50940600eae867b94d502449c665fed0fff36561787be34c682c95b47a854c5f
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -60,8 +60,8 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 259e479fba128f093d8bd1dad7c138c3a34d5b0f19c92a192a11d92bb9ce928a
+ * body-sha256: 85a0864fe29e794fde4ac70152a1f39fec9b63c58a11429a4256b2915e7718ec
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -213,7 +213,7 @@ static inline void point_vortices_increment(const double *coef, const point_vort
     }
 }
 
-/* A sweep over y, or the update of x at the end of a stage, for a row segment. */
+/* A sweep over y, or the update of x at the end of a stage, on a row segment. */
 static void point_vortices_stage_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *to, size_t unit)
 {
@@ -238,7 +238,7 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* Derivative of a sweep with respect to y, along v, for a row segment. */
+/* Derivative of a sweep with respect to y, along v, on a row segment. */
 static void point_vortices_slope_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *v, double *const *to, size_t unit)
 {
@@ -325,7 +325,7 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
     if (values != NULL) point_vortices_put(s, rows, values);
 }
 
-/* Copy the parameters at sites into rows. */
+/* Copy the parameters that may vary between sites to arrays of the solver. */
 static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
 {
     point_vortices_put_parameter(s, s->x[2], params->G, 1.0);
@@ -486,7 +486,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     return largest_change;
 }
 
-/* Predict the solution of a stage, with the halo: s->y[0] = x + (y - x extrapolated from earlier steps). */
+/* Predict the solution of a stage, with the halo: x plus a change that is extrapolated from earlier steps. */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_EACH_PIECE

@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a618890d0bb8534f644b4ab6b6c2aa59ef4300676c33205b7f249259eb401a20
+# body-sha256: 0c0fae582863ddebebd121ebdba377cf5f401d9dfa4c614683983635b7529f28
 import numpy as np
 
 VERSION = "0.1.0"
@@ -109,9 +109,10 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """Return 1 at sites whose neighbours from offset low to offset high along each axis exist, else 0.
+        """Return 1 at sites whose neighbours from offset `low` to offset `high` along each axis exist, else 0.
 
-        bounds lists low and high for each axis. Neighbours beyond an open end do not exist.
+        The arguments are `low` and `high` for the first axis, then for the next axis, and so on. Neighbours beyond an
+        open end do not exist.
         """
         if bounds not in self._known:
             there = np.ones(self.sizes)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: b38dc0811d670207d934957245c70e50d68281aaa4a8f6da2701fc3ab020e3e4
+ * body-sha256: 7b4b4e6cb33d43d6b22d8ca3c76e57b41cb58383585c05a33185cf901345480d
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -180,7 +180,7 @@ static int predator_prey_predict(const predator_prey_history *history, double va
     return history->order > 0 && distance <= predator_prey_REACH * size;
 }
 
-/* Update the predictor with a solution; difference[k] is then the error of a prediction by k entries. */
+/* Update the predictor. difference[k] becomes the solution minus the sum of the first k old differences. */
 static void predator_prey_remember(predator_prey_history *history, const double value[predator_prey_DIM])
 {
     double least = HUGE_VAL, next[predator_prey_DIM];

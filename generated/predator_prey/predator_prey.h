@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c63110579fa48aedbb7d002aefda0ca2aae7538900babcc70c1f8b6b459ae8d3
+ * body-sha256: 3b8612939f94cf63141dae8312cdd9c71005af0e9e290eeec736908de9609dfa
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -72,8 +72,8 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

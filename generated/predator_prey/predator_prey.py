@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 628767a9a3eeb4f94e91550db8d896e15636f34e8e204a67fd0b62d3907cf0c8
+# body-sha256: f25a35338821dd17b4869c566a142e58d8b3a1113d5ea7f1262d14598b3fd6b4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -213,7 +213,7 @@ MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most thi
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
+    """Return for which members the increment `end` - `x` is plausible: it is short, or changes the energy little.
 
     If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
     the motion.

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4253665dde88a1ee93f3ef0a6357235f8a778741a3ba37daf71442782817d5e0
+ * body-sha256: 56fa5b7886680aa44bba6541bd9a9b3b6efbc5ac0c2b4a270e0abca7d36c61ba
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -15,7 +15,7 @@ extern "C" {
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "700546472243a76056288ba748c5fa272452573e41bbf16315339d7dc615c693"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* number of coefficients: functions of params and h */
-enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: length */
+enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs whose multiples are subtracted from H: `length` */
 enum { quaternion_top_DIFFERENCES = 9 }; /* entries of the predictor; more would amplify rounding errors */
 
 typedef struct {
@@ -79,8 +79,8 @@ quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double 
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

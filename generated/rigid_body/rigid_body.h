@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b51dccd23c92cd7830363fc7913e2bfdff6e99ba1b7e8cd76f0ae9506794f76c
+ * body-sha256: 5daa06cd5d3050b86b39b9567d90df584a55d6a732faa182180c53b0dcca0320
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -15,7 +15,7 @@ extern "C" {
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
 enum { rigid_body_COEFFICIENTS = 35 }; /* number of coefficients: functions of params and h */
-enum { rigid_body_GAUGES = 1 };        /* number of Casimirs whose multiples are subtracted from H: C */
+enum { rigid_body_GAUGES = 1 };        /* number of Casimirs whose multiples are subtracted from H: `C` */
 enum { rigid_body_REMEMBERED = 111 };  /* number of past solutions that the recurrence is fitted to */
 enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
 enum { rigid_body_AHEAD = 8 };         /* number of solutions that the recurrence predicts */
@@ -63,7 +63,7 @@ typedef struct {
     /* value of single_steps after the last failed block, halved by each successful block */
     int last_single_steps;
     int use_recurrences;              /* 1 if recurrences predict blocks, 0 if Runge-Kutta steps do */
-    int passes_without_recurrences;   /* iterations of the last block predicted by Runge-Kutta steps */
+    int passes_without_recurrences;   /* iterations that the latest block without recurrences took */
     size_t steps_without_recurrences; /* steps to wait before recurrences are tried again */
     size_t recurrences_from_step;     /* number of the step from which recurrences are tried again */
 } rigid_body_block_measurements;
@@ -110,8 +110,8 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 /* The factors of Casimirs in s->gauge are unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3b1a5d1bd2ddb8bf0d5895ffc0b4be0c71ec00c282155916de426b6047eab326
+ * body-sha256: 46f9518e6c0b646e887d7feb620bf95f819db640d432a1284d9e5291e080aff2
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -86,8 +86,8 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
 thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double h, size_t steps,
     const double *dw);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
-   last good state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last
+   good state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

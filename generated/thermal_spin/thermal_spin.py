@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e2a499e74225065b40b29a65faa2574165e5d834df865bbd4e4571cd2dd6b225
+# body-sha256: 54c6c80b12e482b3f5dcb5fe9f06a19e889da848e19c545f65b5c994ec51615c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -307,7 +307,7 @@ MAX_ENERGY_CHANGE = 0.5  # increments over PLAUSIBLE may change H by at most thi
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
+    """Return for which members the increment `end` - `x` is plausible: it is short, or changes the energy little.
 
     If a step is too large, its equation may have solutions far away, at another energy, that have nothing to do with
     the motion.

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 252f0789e73ae9c9c0ba97bd2c3f8a65063b6b5fa1032ae88c980151b8f9fc8e
+ * body-sha256: d97e83df26bb7aa4f4a0ecd65c5783cf0ca9ebe7fab1db2e388dcfe956b34f7f
  */
 #ifndef TODA_H
 #define TODA_H
@@ -38,7 +38,7 @@ typedef struct {
     double *x[toda_ARRAYS]; /* the values of fields, then of parameters at sites */
     double *before[toda_DIM]; /* copies of the fields, to restore them if a step fails */
     int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */
-    size_t full_range; /* number of next steps that call slower functions, for arguments of any size */
+    size_t full_range; /* the next `full_range` steps use slower functions, for arguments of any size */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */
     double h; /* size of the last step */

@@ -62,7 +62,7 @@ def copies(
             ir.Call("put_parameter", (S, _row("x", arrays.index(p.name)), _of(PARAMS, p, members), _default(p)))
             for p in sites
         ]
-        doc = "Copy the parameters at sites into rows"
+        doc = "Copy the parameters that may vary between sites to arrays of the solver"
         yield typed_function("put_parameters", doc, ("s", "params"), (*body, _copied(sites, members)), types)
     if bonds:
         number = ir.Entry(ir.Member(S, "number"), K)

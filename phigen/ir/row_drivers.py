@@ -106,7 +106,7 @@ class RowDrivers:
         if orders:
             text = "fields in permuted order, so that a loop for one order of the fields serves for another"
             head.append(ir.Comment(text))
-        said = ", for a row segment" * alone + ", for the row segments first ... end - 1" * several
+        said = ", on a row segment" * alone + ", on the row segments `first` ... `end` - 1" * several
         function = ir.Function(name, doc + said, Role.OTHER, ("s", *parameters, *range_names), (*head, *orders, *body))
         return discard_unread(function)
 

@@ -454,7 +454,9 @@ def _sweep(
     near_seam = motion is flow.beside
     suffix = "_beside" if near_seam else f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
     location = f" on the seam {flow.window}" if flow.window else " near seams" if near_seam else ""
-    purpose = f"the flow of {hamiltonian}{location}: {motion.manner}".replace(KICK, KICK.kind)
+    # the name of a single field could be read as a word: "a multiplied by a factor"
+    manner = "field " * (motion.manner.split(" ", 1)[0] in cell.fields) + motion.manner
+    purpose = f"the flow of {hamiltonian}{location}: {manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
     purpose = f"for each site a, the forces of H_{k} on a, summed over {_others(cell)} b"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
@@ -565,7 +567,7 @@ def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
 
 
 def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
-    boundary = ", ".join(f"{a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
+    boundary = ", ".join(f"axis {a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
     related = {GRAPH: "sites with bonds between them, given at run time", PAIRS: "all pairs of sites"}
     return (
         f"lattice: {related.get(cell.relation, boundary)}; any size"

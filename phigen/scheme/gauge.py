@@ -75,8 +75,8 @@ class Gauge:
     @property
     def facts(self) -> list[str]:
         """The lines about the gauge in the header of generated files."""
-        several = len(self.free) > 1
-        names = f"{'multiples of the Casimirs' if several else 'a multiple of the Casimir'} {', '.join(self.free)}"
+        several, quoted = len(self.free) > 1, ", ".join(f"`{name}`" for name in self.free)
+        names = f"{'multiples of the Casimirs' if several else 'a multiple of the Casimir'} {quoted}"
         factors = "the factors are" if several else "the factor is"
         lines = [f"gauge: {self.letter} minus {names}; {factors} chosen at the start of each trajectory"]
         terms = " - ".join(f"({value}) {name}" for name, value in self.fixed.items())

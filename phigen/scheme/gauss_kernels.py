@@ -122,7 +122,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
     return Kernel(
         "next_frame",
-        "replace the derivatives `k` of the unknowns of a step that ends at `z` by derivatives for the next step",
+        "at the end of a step, where the unknowns are `z`, transform their derivatives `k` for the next step",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "k": slopes},
         (Output("seen", tuple(coefficients.hoist(values))),),
     )

@@ -232,8 +232,8 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
     flat = coefficients.hoist([*generating.slope, *jacobian])
     return Kernel(
         "generate",
-        "`slope` receives p = grad S_h(y); `jacobian` receives 1 - Hess S_h(y) pi(y) / 2, the Jacobian of the equation "
-        "for p up to O(h^2)",
+        "compute the momenta `slope` = grad S_h(y), and `jacobian` = 1 - Hess S_h(y) pi(y) / 2, which differs by "
+        "O(h^2) from the Jacobian of the equation for p",
         {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),
     )

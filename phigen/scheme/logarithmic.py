@@ -81,8 +81,8 @@ def fact_of(negative: str) -> str:
     """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is the negative part of
     H as text."""
     return (
-        "monitor: log; steps are equal in tau, and follow K = log(A + e) - log(-B), where H = A + B, e = -H(x0),"
-        f" B = {negative}"
+        "monitor: log; steps are equal in the rescaled time tau, with the Hamiltonian K = log(A + e) - log(-B), where "
+        f"H = A + B, e = -H(x0), B = {negative}"
     )
 
 

@@ -61,7 +61,8 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}; steps are equal in tau"
     elif monitor:
-        yield f"monitor: dt = g dtau with g = {monitor}; steps are equal in tau, and follow K = g (H + e), e = -H(x0)"
+        rescaled = "steps are equal in tau, with the Hamiltonian K = g (H + e), e = -H(x0)"
+        yield f"monitor: dt = g dtau with g = {monitor}; {rescaled}"
 
 
 def monitor_of(spec: Spec) -> Expression | None:

@@ -180,7 +180,8 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     )
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
-        held = f"number of Casimirs whose multiples are subtracted from H: {', '.join(program.held)}"
+        names = ", ".join(f"`{name}`" for name in program.held)
+        held = f"number of Casimirs whose multiples are subtracted from H: {names}"
         sizes.append(
             (
                 "GAUGES",

@@ -116,7 +116,7 @@ LATTICE = (
         "!SERIES",
         (
             "int open; /* 1 if x includes the last flow of the last step, but the state in `before` does not */",
-            "size_t full_range; /* number of next steps that call slower functions, for arguments of any size */",
+            "size_t full_range; /* the next `full_range` steps use slower functions, for arguments of any size */",
         ),
     ),
     StateBlock(

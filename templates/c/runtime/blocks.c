@@ -173,7 +173,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* recurrences are fitted if this number of steps follows; also, number of steps without recurrences after their first failure */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps that repay a fit of recurrences; after recurrences fail for the first time, this number of steps is made without them */
     PHI_MOST_SINGLE_STEPS = 1000,     /* largest number of single steps after a failed block */
     PHI_TOO_MANY = 5 * PHI_LANES      /* recurrences are abandoned if a failed block leads to more single steps than this */
 };

@@ -131,10 +131,10 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
     }
 }
 
-/* Predict the solutions of a block without recurrences. The states at the starts of all steps are predicted first; then
-   each lane iterates the stages of its step. In a stage, y starts at the start of the stage plus half the exact
-   increment. The error of this starting value is of third order in the size of the stage if y is the mean of start and
-   end, else of second order. The constant in this error is fitted to the earlier stages of the step. */
+/* Predict the solutions of a block if recurrences are not used. The states at the starts of all steps are predicted
+   first; then each lane iterates the stages of its step. In a stage, y starts at the start of the stage plus half the
+   exact increment. The error of this starting value is of third order in the size of the stage if y is the mean of
+   start and end, else of second order. The constant in this error is fitted to the earlier stages of the step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM], predicted[PHI_DIM], missed[PHI_DIM];

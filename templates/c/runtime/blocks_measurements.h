@@ -9,7 +9,7 @@ typedef struct {
     int single_steps;                  /* number of single steps to make before the next block */
     int last_single_steps;             /* value of single_steps after the last failed block, halved by each successful block */
     int use_recurrences;               /* 1 if recurrences predict blocks, 0 if Runge-Kutta steps do */
-    int passes_without_recurrences;    /* iterations of the last block predicted by Runge-Kutta steps */
+    int passes_without_recurrences;    /* iterations that the latest block without recurrences took */
     size_t steps_without_recurrences;  /* steps to wait before recurrences are tried again */
     size_t recurrences_from_step;      /* number of the step from which recurrences are tried again */
 } phi_block_measurements;

@@ -16,9 +16,9 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
     }
 }
 
-/* Predict the solutions of a block without recurrences. The steps are first made by the classical Runge-Kutta method.
-   Then the predictions are the points at which (alpha + beta)/2 is the mean of start and end of these steps, to leading
-   order. */
+/* Predict the solutions of a block if recurrences are not used. The steps are first made by the classical Runge-Kutta
+   method. Then the predictions are the points at which (alpha + beta)/2 is the mean of start and end of these steps, to
+   leading order. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];

@@ -272,7 +272,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the last change is about the error before the last sweep: if it is small, this sweep was not needed */
+                /* the change by this sweep is nearly the error before the sweep; if the change is small, the sweep was not needed */
                 if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
 #if PHI_STAGED

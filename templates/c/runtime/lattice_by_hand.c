@@ -6,11 +6,12 @@
 #include "sweeps.h"
 
 /* ---- Caller-driven stepping ---- */
-/* Number of stages that callers can make: the stages of a step and, without noise, its last stage merged with the first
-   one. */
 #if PHI_NOISE
+/* Number of stages that callers can make: the stages of a step. */
 enum { PHI_NUMBERED = PHI_FLOWS };
 #else
+/* Number of stages that callers can make: the stages of a step, and one that merges the last stage of a step with the
+   first stage of the next step. */
 enum { PHI_NUMBERED = PHI_FLOWS + 1 };
 #endif
 

@@ -201,7 +201,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #else
     if (!s->open) phi_to_relative(s, s->x);
     if (!s->open) phi_clear_other_carry(s);
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if s->open, continue from the state before the last flow; the next flow includes it */
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if s->open, take the last flow out of x: this flow is merged with the first flow of the next step */
 #endif
     status = phi_march(s, steps);
 #if !PHI_NOISE

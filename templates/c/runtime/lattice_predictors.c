@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Predict the solution of a stage, with the halo: s->y[0] = x + (y - x extrapolated from earlier steps). */
+/* Predict the solution of a stage, with the halo: x plus a change that is extrapolated from earlier steps. */
 static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
 {
     PHI_EACH_PIECE

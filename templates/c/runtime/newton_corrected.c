@@ -18,7 +18,7 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
-/* Compute the correction of the increment that a residual of the equation for y causes, in all lanes. */
+/* Compute the correction of the increment from a residual of the equation for y, in all lanes. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
 #if PHI_CENTRED

@@ -19,7 +19,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return history->order > 0 && distance <= PHI_REACH * size;
 }
 
-/* Update the predictor with a solution; difference[k] is then the error of a prediction by k entries. */
+/* Update the predictor. difference[k] becomes the solution minus the sum of the first k old differences. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM])
 {
     double least = HUGE_VAL, next[PHI_DIM];

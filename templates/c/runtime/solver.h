@@ -97,8 +97,8 @@ phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const doub
    1) h with a copy of *s. Returns PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
 phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their last good
-   state. status, unless NULL, receives the status of each. Returns the first failure, or OK. */
+/* Integrate members in place: x[i * members + m] is coordinate i of member m. Failed members get their last good
+   state. status[m] is for member m; `status` may be NULL. Returns the first status that is not OK. */
 #if PHI_GROUPS || PHI_PACKS
 /* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 #endif

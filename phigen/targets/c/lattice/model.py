@@ -206,7 +206,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         yield "LEAD", (layout.halo + 7) // 8 * 8, "number of doubles before the first site of a row"
     yield "RESERVED", _reserved(layout, has), "number of arrays over the sites in the memory of a solver"
     if several:
-        yield "LINES", len(layout.lines), "number of rows that loops over a row read: the row itself and its neighbours"
+        yield "LINES", len(layout.lines), "number of rows that a loop over one row reads: this row and its neighbours"
     yield "ROW", max(1, step.row), f"number of coefficients of one {'stage' if step.equation else 'flow'}"
     yield "ROWS_OF_FLOWS", rows_of(step), "number of rows of coefficients"
     if step.refresh:

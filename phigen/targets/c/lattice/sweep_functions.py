@@ -167,9 +167,8 @@ class _PartLoops:
                 cases.append(self._segment(k, forms, names))
                 continue
             for form in sorted(forms):
-                title = f"The flow of H_{k + 1}" + ", with functions that accept arguments of any size" * (
-                    form == "_full_range"
-                )
+                range_text = ", with functions for arguments of any size" * (form == "_full_range")
+                title = f"The flow of H_{k + 1}{range_text}"
                 case = self._segment(k, {form: forms[form]}, names)
                 yield commented(build.driver(f"rows{k + 1}{form}", title, ["coef"], [case]), program)
             arguments = (S, COEF, ir.fixed("first"), ir.fixed("end"))
