@@ -1,10 +1,10 @@
 """The results of compiling one spec: ``Compilation = CompiledSeries | CompiledSplitting | CompiledGauss |
 CompiledLattice``.
 
-All four classes have the members of `_Compiled` and a property ``system``; for a lattice of any size, this property
-raises `SpecError`. The methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return the compilation itself,
-with the type of one class: `by_gauss`, for instance, with the type `CompiledGauss`. A compilation of another class
-raises `ValueError` instead.
+All four classes have the members of `_Compiled` and a property ``system``. For lattices, whose size is open, this
+property raises `SpecError`. The methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return the compilation
+itself, with the type of one class: `by_gauss`, for instance, with the type `CompiledGauss`. A compilation of another
+class raises `ValueError` instead.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: d3e75fecdfb391c7f8e2f0b7dfa28fabeede27061592b2431d9d65234c2d1fcc
+ * body-sha256: bca9713c52ca548793f476e8455139220ced8a7f5b905387edc9dad0629fd7b4
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -580,8 +580,8 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
 }
 
 /* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that
-   path; S_h is the generating function. A step that needs more than guiding_centre_MOST_PIECES pieces is too
-   large for a meaningful solution. */
+   path; S_h is the generating function. If the paths of a step need more than guiding_centre_MOST_PIECES
+   Taylor expansions, the step is too large for a meaningful solution. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
     const double *coef = s->coef[stage];

@@ -8,7 +8,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 914ed5961131d438dfa7a4e62a3227f37b25ba73a131d7350c715678a829ae42
+# body-sha256: b942a55f805a9ccb1a4226685df8959e0e62c31c43cd8b99a1709c3692ff18d2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -501,8 +501,8 @@ def _attempt(coef, x, carry, p):
     """Make one stage: solve p = grad S_h(mean of the path) for the covector p, and move to the end of the path.
 
     The path dm/dt = pi(m) p, 0 <= t <= 1, starts at m = x; S_h is the generating function. x, carry and p have the
-    shape (members, DIM); iterations start from p. A step that needs more than MOST_PIECES pieces of paths is too large
-    for a meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the
+    shape (members, DIM); iterations start from p. If the paths of a step need more than MOST_PIECES Taylor expansions,
+    the step is too large for a meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the
     equation was solved.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()

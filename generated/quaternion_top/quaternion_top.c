@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 17da69427ce8a1648efc946db363d49352255457ef0a6bfaa6922a6e526b1d70
+ * body-sha256: 13db8f628dd4f2cfe8595823bd35851a1ed0d7b094169e15ebe475c7ef22ad53
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -813,8 +813,8 @@ static int quaternion_top_differences(quaternion_top_solver *s, const double *co
 }
 
 /* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that
-   path; S_h is the generating function. A step that needs more than quaternion_top_MOST_PIECES pieces is too
-   large for a meaningful solution. */
+   path; S_h is the generating function. If the paths of a step need more than quaternion_top_MOST_PIECES
+   Taylor expansions, the step is too large for a meaningful solution. */
 static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 {
     const double *coef = s->coef;

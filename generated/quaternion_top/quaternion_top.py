@@ -9,7 +9,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 9d345cf4efd6d14a73238d4f24712738a9f60cf9b57e8658f5e498dd320d5681
+# body-sha256: 876ace075299181469b8efc067f268fe85d3528260178c4f2238ae4787fdaee8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -840,8 +840,8 @@ def _attempt(coef, x, carry, p):
     """Make one stage: solve p = grad S_h(mean of the path) for the covector p, and move to the end of the path.
 
     The path dm/dt = pi(m) p, 0 <= t <= 1, starts at m = x; S_h is the generating function. x, carry and p have the
-    shape (members, DIM); iterations start from p. A step that needs more than MOST_PIECES pieces of paths is too large
-    for a meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the
+    shape (members, DIM); iterations start from p. If the paths of a step need more than MOST_PIECES Taylor expansions,
+    the step is too large for a meaningful solution. Returns the new x, its compensation term, p, and a status for each member: "" if the
     equation was solved.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()

@@ -163,12 +163,13 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ on a star algebra, and elements f_k of the algebra, all divided by numbers.
+    """A functional x̃ and elements f_k of a star algebra, divided by numbers such that products need few
+    multiplications by constants.
 
-    The f_k are the elements in the field ``frame`` of `StarAlgebra`. ``at_basis`` has the values of x̃/q at the basis
-    elements of the algebra, and ``frame`` has the elements f_k/c_k. The numbers q and c_k are chosen such that products
-    need few multiplications by constants. Let E_a be the basis of the Lie algebra. Then x̃(E_a) is the sum of
-    ``combination[a][k]`` times the value of x̃/q at f_k/c_k over all k.
+    The functional x̃ extends the state x, which is a functional on the Lie algebra. It is divided by a number q:
+    ``at_basis`` has the values of x̃/q at the basis of the star algebra. The f_k are the elements `StarAlgebra.frame`,
+    and ``frame`` has the elements f_k/c_k with numbers c_k. For the basis E_a of the Lie algebra, x̃(E_a) =
+    Σ_k ``combination[a][k]`` (x̃/q)(f_k/c_k).
     """
 
     at_basis: list[Expression]

@@ -51,9 +51,10 @@ def powers(exponents: Mapping[str, int]) -> Expression:
 class SumFactors:
     """The common factor of the forces that bonds or pairs exert on one field.
 
-    The factor is a product of powers of parameters that have a value at every site and may be 0. Solvers sum the forces
-    without this factor, and then multiply the sum by ``at_site``, the factor at the site. ``at_end`` states this factor
-    for a bond or pair whose end a is the site, as a map from symbols such as ``m[a]`` to their exponents.
+    The factor is a product of powers of parameters. These parameters have a value at every site, which may be 0.
+    Solvers sum the forces without the factor, and then multiply the sum by the factor. ``at_site`` is the factor as an
+    expression. ``at_end`` is the factor as a map from symbols such as ``m[a]`` to their exponents. Bonds and pairs have
+    the ends a and b; the site is at the end a.
     """
 
     at_site: Expression = ONE

@@ -27,8 +27,9 @@ _Place = tuple[int, Monomial]
 def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
     """Yield lists of terms in which some terms are replaced by their sum.
 
-    The first list sums terms in whose vector fields monomials cancel each other, the second sums linear terms, and the
-    third does both. Lists that change nothing are left out. Nothing is yielded if π is constant.
+    In the first list, terms are summed if monomials of their vector fields cancel in the sum. In the second list, the
+    linear terms are summed (`_is_linear`). In the third list, both are done. Lists that change nothing are left out.
+    Nothing is yielded if π is constant.
     """
     if not _algebra(ring):
         return

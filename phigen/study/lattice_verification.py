@@ -342,9 +342,9 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"DΦ π DΦᵀ differs from π∘Φ by {defect:.1e}")
-    # Finite differences are computed four times: with two spacings, each in two units. One unit of a coordinate is its
-    # largest magnitude at all sites of the run, the other its largest magnitude at one site. The smallest deviation
-    # from the tangent map counts, since larger deviations are errors of the differences.
+    # Finite differences are computed four times: with two spacings, each in two units. The first unit of a coordinate
+    # is its largest magnitude in all rows at all sites. The second unit is its largest magnitude in all rows at one
+    # site. The smallest deviation from the tangent map counts, since larger ones are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     trials = [(units, spacing) for units in (fields, site_units) for spacing in (3e-3, 3e-4)]

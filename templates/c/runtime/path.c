@@ -118,7 +118,8 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
 }
 
 /* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; S_h is
-   the generating function. A step that needs more than PHI_MOST_PIECES pieces is too large for a meaningful solution. */
+   the generating function. If the paths of a step need more than PHI_MOST_PIECES Taylor expansions, the step is too large
+   for a meaningful solution. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_OF(s->coef, stage);

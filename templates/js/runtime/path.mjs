@@ -148,8 +148,8 @@ const jacobian = new Float64Array(DIM * DIM);
 
 /**
  * Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; S_h is the
- * generating function. Returns a status. A step that needs more than MOST_PIECES pieces is too large for a
- * meaningful solution.
+ * generating function. Returns a status. If the paths of a step need more than MOST_PIECES Taylor
+ * expansions, the step is too large for a meaningful solution.
  */
 function attempt(solver, stage) {
   const coef = solver.coef[stage];
