@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 31964c9d81cce02f31d53e46a587b2b43fe4196d24a044407ad16d9fa9a05b47
+ * body-sha256: c64934fed39578387b50f0f1ece4d3202e31f83f785df7670e76b14e9285a64a
  */
 #include "duffing.h"
 #include <float.h>
@@ -339,7 +339,7 @@ static void duffing_renew(duffing_solver *s)
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);

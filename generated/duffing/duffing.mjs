@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e43dbd604777d988dcd5ac7a9967f288bf9bd2815c5b7dc22f15978b01a71010
+ * body-sha256: b307167c7cf31df54463bd9e80e48c701066794f66e4061cc3623b3af3180692
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -762,7 +762,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
+ * Make one stage by calling `attempt`. If a prediction makes it fail, call it again without one.
  *
  * @param {Solver} solver
  * @param {number} stage

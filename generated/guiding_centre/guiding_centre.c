@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: bca9713c52ca548793f476e8455139220ced8a7f5b905387edc9dad0629fd7b4
+ * body-sha256: 250565fd35a1151b3807579266d034bec1897088421139df5930d9743758a50a
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -638,7 +638,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);

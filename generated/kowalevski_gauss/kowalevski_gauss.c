@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 2c42a3e98c8b1b5a544c15a821c0cc3305c68a75e3e311b4cc542529b2c71039
+ * body-sha256: 27ad30caeb4e8e7057c0eed562a69a4764f5b02a375a49d0c611bdf7f208c852
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -653,7 +653,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 7b4b4e6cb33d43d6b22d8ca3c76e57b41cb58383585c05a33185cf901345480d
+ * body-sha256: 67e9c34eff38106c4fe100557f474f87d4ed75b98cc5f4471edb8e6329189d3d
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -307,7 +307,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 13db8f628dd4f2cfe8595823bd35851a1ed0d7b094169e15ebe475c7ef22ad53
+ * body-sha256: e975f0d4d109882d66c7558e29b532f4061fcc53ecb814d0dd63c0935854e65c
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -892,7 +892,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);

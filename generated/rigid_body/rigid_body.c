@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: f77e149b74cdd4089d2a55f56e3fc6ecc293bb1b11d38c74e14ff5faa6ad27e5
+ * body-sha256: 26acc0092cb98d6085c9af9b5dfe0dd73895d0c6ec732aaa4d326577f9995051
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -873,7 +873,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);

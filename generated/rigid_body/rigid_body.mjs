@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b65b16a81143c29c59cb9ed7bc9f7b65a3a91fb50f32d8480a91e59764ad5b19
+ * body-sha256: 6ab85e34cab204c87a229810837b5301a53aba6280a3f9c7b67b46c33e8b06f1
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -1048,7 +1048,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
+ * Make one stage by calling `attempt`. If a prediction makes it fail, call it again without one.
  *
  * @param {Solver} solver
  * @param {number} stage

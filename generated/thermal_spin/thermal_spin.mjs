@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2b125300a6160ad6ab4ac3a65750dae4fd7fbe51904c656263b75b6cefd991f6
+ * body-sha256: a6cc702ab0c35ab7b04bdbb083e6f5b504654668758255aa1a2d6f4f2ab477d6
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -980,7 +980,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
+ * Make one stage by calling `attempt`. If a prediction makes it fail, call it again without one.
  *
  * @param {Solver} solver
  * @param {number} stage

@@ -84,7 +84,7 @@ def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
 
 
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
-    """Yield the elementary symmetric functions of the eigenvalues of P = Σ p_i E_i, from 1 to the determinant.
+    """Yield the elementary symmetric functions e_0 = 1, e_1, … of the eigenvalues of P = Σ p_i E_i; the last is det P.
 
     If all E_i are skew, the functions of odd degree are 0.
     """

@@ -136,7 +136,7 @@ def dimension(family: str, size: int) -> int:
     if size < smallest:
         raise SpecError([Diagnostic(f"{family}({size}) does not exist: its size is at least {smallest}")])
     if family == "sp" and size % 2:
-        raise SpecError([Diagnostic(f"sp({size}): the size of the matrices is even, sp(2), sp(4), …")])
+        raise SpecError([Diagnostic(f"sp({size}): the size of the matrices must be even: sp(2), sp(4), …")])
     return dimension_of(size)
 
 

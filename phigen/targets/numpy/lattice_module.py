@@ -50,6 +50,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["of_step"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
+    values["by_colour"] = step.by_colour
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row" if step.by_colour else "part, row"
     values["flows"] = "sites.schedule" if step.by_colour else "SCHEDULE"

@@ -7,7 +7,7 @@
 #include "path.c"
 #include "gauss.c"
 
-/* Make one stage; in a Gauss step, all stages. If this fails from a prediction, repeat it without one. */
+/* Make one stage; in a Gauss step, all stages. If a prediction makes the iteration fail, start without it. */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     const phi_status status = phi_attempt(s PHI_AND_STAGE);

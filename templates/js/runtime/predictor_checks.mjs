@@ -126,7 +126,7 @@ export function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage by calling `attempt`. If this fails from a prediction, call it again without a prediction.
+ * Make one stage by calling `attempt`. If a prediction makes it fail, call it again without one.
  *
  * @param {Solver} solver
  * @param {number} stage
