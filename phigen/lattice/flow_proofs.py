@@ -9,6 +9,7 @@ constant along the flow, since all coordinates of a part commute over the whole 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from phigen.lattice.cell import Cell
 from phigen.lattice.graphs import sums_by_field
@@ -29,7 +30,7 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.symbols import CHOSEN, Symbol
-from phigen.symbolic.verdict import PROVED, Statement, decide_zero
+from phigen.symbolic.verdict import Statement, decide_equivalent, decide_zero
 
 
 def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
@@ -50,9 +51,8 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
         name = f"the flow Φ of {part_name} at each site: Φ_0 = 1, dΦ_t/dt = {field_name}∘Φ_t"
         yield _flow_statement(name, flow, positive)
     for source, flow in zip(cell.noise, plan.noise, strict=True):
-        residuals = [r for motion in flow.motions for r in motion_residuals(motion)]
         name = f"the flow Φ of the noise {source} at each site: Φ_0 = 1, dΦ_t/dt = ΔW σπ∇g∘Φ_t"
-        yield decide_zero(name, residuals, positive, flow.manner)
+        yield _flow_statement(name, flow, positive)
 
 
 def _flow_statement(name: str, flow: CellFlow, positive: Sequence[str]) -> Statement:
@@ -61,12 +61,8 @@ def _flow_statement(name: str, flow: CellFlow, positive: Sequence[str]) -> State
     If the equation of `motion_residuals` is not proved, for instance for a drag proportional to p|p|, the equivalent
     equation of `_transport_residuals` may be.
     """
-    statement = decide_zero(name, [r for m in flow.every_motion for r in motion_residuals(m)], positive, flow.manner)
-    if statement.verdict != PROVED:
-        residuals = [r for m in flow.every_motion for r in _transport_residuals(m)]
-        transported = decide_zero(name, residuals, positive, flow.manner)
-        return transported if transported.verdict == PROVED else statement
-    return statement
+    forms = (map(form, flow.every_motion) for form in (motion_residuals, _transport_residuals))
+    return decide_equivalent(name, map(chain.from_iterable, forms), positive, flow.manner)
 
 
 def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:

@@ -120,6 +120,7 @@ class LatticeBodies:
         increments = dict(zip(names, motion.increments(names), strict=True))
         rates = dict(zip(names, motion.field(names), strict=True))
         moved = SiteMotion(0, increments, (), rates, increments, motion.manner)
+        # the Hamiltonian of the motion is the energy of a body, divided by the reduced mass of the body
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:

@@ -27,7 +27,7 @@ from phigen.symbolic.expression import (
     symbol,
     total,
 )
-from phigen.symbolic.verdict import PROVED, Statement, decide_zero
+from phigen.symbolic.verdict import Statement, decide_equivalent, decide_zero
 
 
 def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
@@ -150,12 +150,10 @@ def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     """
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
-    statement = decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
-    moves = flow.motion or any(part_flow.motion for part_flow in flow.pieces)
-    if statement.verdict != PROVED and not moves:
-        transported = decide_zero(name, list(_transport_residuals(system, flow)), system.positive, flow.manner)
-        return transported if transported.verdict == PROVED else statement
-    return statement
+    forms = [_residuals(system, flow)]
+    if not (flow.motion or any(part_flow.motion for part_flow in flow.pieces)):
+        forms.append(_transport_residuals(system, flow))
+    return decide_equivalent(name, forms, system.positive, flow.manner)
 
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:

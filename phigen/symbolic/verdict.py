@@ -80,6 +80,25 @@ def decide_zero(
     )
 
 
+def decide_equivalent(
+    name: str,
+    alternatives: Iterable[Iterable[tuple[str, Expression]]],
+    positive: Collection[str] = (),
+    detail: str = "",
+) -> Statement:
+    """Decide a statement that has several equivalent forms. It is proved if all residuals of one form vanish.
+
+    Each item of ``alternatives`` has the residuals of one form, and is read only if no earlier form is proved. If none
+    is proved, the verdict is that of the first form. The other arguments are those of `decide_zero`.
+    """
+    statements = []
+    for residuals in alternatives:
+        statements.append(decide_zero(name, list(residuals), positive, detail))
+        if statements[-1].verdict == PROVED:
+            return statements[-1]
+    return statements[0]
+
+
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:

@@ -21,9 +21,13 @@ from phigen.cli import group
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError, StepError
+from phigen.lattice.cell_building import cell_from_spec
+from phigen.lattice.relative_bodies import INNER_MASS, lattice_bodies
 from phigen.lattice.states import start_of
 from phigen.runtime.lattice import LatticeSolver
 from phigen.study.lattice_verification import verify_lattice
+from phigen.symbolic.expression import derivatives, symbol
+from phigen.symbolic.verdict import PROVED, decide_zero
 
 TEXT = """\
 phigen: 1
@@ -126,6 +130,19 @@ def test_the_change_the_parts_and_their_flows_are_proved(change: str, momenta: b
     statements = examination.groups["Splitting"]
     assert len(statements) == 4
     assert {s.verdict for s in statements} == {"proved"}
+
+
+def test_the_remainder_subtracts_the_potential_energy_of_the_kepler_motions() -> None:
+    spec = phigen.spec.loads(text("jacobi", "xy"))
+    bodies = lattice_bodies(cell_from_spec(spec), spec)
+    remainder = next(flow for flow in bodies.flows().flows if flow.motion is None)
+    subtracted = remainder.hamiltonian - bodies.cell.pair_hamiltonian
+    m, inner = symbol("m"), symbol(INNER_MASS)
+    reduced_mass = m * (inner - m) / inner
+    ((x, v), _) = bodies.axes
+    acceleration = derivatives([remainder.motions[0].rates[v]], INNER_MASS)[0] * inner
+    residual = reduced_mass * acceleration + derivatives([subtracted], x)[0]
+    assert decide_zero("force of the subtracted energy", [("", residual)], ["m"]).verdict == PROVED
 
 
 @pytest.mark.thin(2, of_all=1)
