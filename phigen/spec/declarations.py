@@ -17,7 +17,7 @@ from phigen.spec.indices import Indices
 from phigen.spec.kinds import Reader
 from phigen.spec.model import Lattice, Parameter
 from phigen.spec.names import ARGUMENTS, NOISY_ARGUMENTS, SPEC_FUNCTIONS, TIMED_ARGUMENTS, argument_hint
-from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.problems import counted, did_you_mean, one_of, shown
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Node, Scalar
 from phigen.symbolic.expression import Expression, symbol, symbols_of
@@ -26,6 +26,9 @@ from phigen.symbolic.neighbours import ENDS, Neighbours, Offset
 Raw = Mapping[str, Any]
 NOTHING = AllowedNames({})
 RENAME = "choose another name"
+
+#: Largest number of coordinates that a hint lists.
+_MOST_LISTED = 12
 
 
 @dataclass
@@ -274,9 +277,13 @@ class Declarations:
         if node.text in self.coordinates:
             return self.coordinates.index(node.text)
         if not self.incomplete:
-            hint = did_you_mean(node.text, self.coordinates)
-            self.reader.error(node, f"{shown(node.text)} is not a coordinate", hint)
+            self.reader.error(node, f"{shown(node.text)} is not a coordinate", self.coordinate_hint(node.text))
         return None
+
+    def coordinate_hint(self, name: str) -> str:
+        """Return the hint for a name that is not a coordinate: a similar coordinate, or all if they are few."""
+        similar = did_you_mean(name, self.coordinates)
+        return similar or (one_of(self.coordinates) if 0 < len(self.coordinates) <= _MOST_LISTED else "")
 
     # --- declaring
 

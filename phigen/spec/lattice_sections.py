@@ -14,7 +14,7 @@ from phigen.spec.declarations import Declarations, Raw
 from phigen.spec.grammar import AllowedNames
 from phigen.spec.indices import Indices
 from phigen.spec.model import Lattice, LatticeRunSettings, Values
-from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.problems import counted, shown
 from phigen.spec.spectra import correlation_of, spectrum_of
 from phigen.spec.values import values
 from phigen.spec.yaml_source import Scalar
@@ -241,7 +241,7 @@ def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]
     else:
         for c, (key, _) in initial.items():
             if c not in fields and not declared.incomplete:
-                declared.reader.error(key, f"{shown(c)} is not a coordinate", did_you_mean(c, fields))
+                declared.reader.error(key, f"{shown(c)} is not a coordinate", declared.coordinate_hint(c))
         if missing_fields := [c for c in fields if c not in initial]:
             _fail(name, "initial", f"initial: no value for {', '.join(missing_fields[:10])}", declared)
         state = {c: values(node, declared) for c, (_, node) in initial.items()}

@@ -77,6 +77,6 @@ def _field(node: Scalar, key: str, declared: Declarations) -> str:
     """Return the coordinate that a node names; "" after an error, which is reported."""
     if node.text in declared.coordinates or declared.incomplete:
         return node.text
-    hint = did_you_mean(node.text, declared.coordinates) or one_of(declared.coordinates)
-    declared.reader.error(node, f"{key}: {shown(node.text)} is not a coordinate", hint)
+    message = f"{key}: {shown(node.text)} is not a coordinate"
+    declared.reader.error(node, message, declared.coordinate_hint(node.text))
     return ""

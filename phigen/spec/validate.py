@@ -287,8 +287,8 @@ def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
         entries = entries_of_kinds.get(kind) or {}
         for name, (key, _) in entries.items():
             if name not in declared.coordinates and not declared.incomplete:
-                hint = did_you_mean(name, declared.coordinates)
-                declared.reader.error(key, f"forces: {name!r} is not a coordinate", hint)
+                message = f"forces: {name!r} is not a coordinate"
+                declared.reader.error(key, message, declared.coordinate_hint(name))
         forces[kind] = _formulas(entries, declared, declared.dated_scope())
     return SpecForces(forces["covector"], forces["vector"], declared.formula(damping, declared.dated_scope()))
 
